@@ -1,0 +1,37 @@
+"""Tendon-driven continuum robots: from how far each tendon is pulled to the shape, and back.
+
+SI units everywhere (m, rad, N, Pa). The base frame has z along the backbone towards the tip and x
+towards azimuth 0; azimuths count counter-clockwise about +z. Displacements are changes of a tendon's
+length inside the robot: negative pulls.
+
+>>> import tdcr
+>>> robot = tdcr.Robot(tdcr.Backbone(0.2, 20), [tdcr.Tendon(0.0, 0.01)])
+>>> shape = tdcr.forward(robot, [-0.01], model="linkage")
+>>> shape.status
+<Status.converged: 'converged'>
+>>> shape.positions[-1].round(4).tolist()
+[0.0919, 0.0, 0.1683]
+"""
+
+from __future__ import annotations
+
+from tdcr._batch import ShapeBatch, forward_batch
+from tdcr._core import Backbone, LinkageSettings, Robot, Shape, Tendon, forward
+from tdcr._core import __version__ as __version__
+from tdcr._status import Status
+from tdcr.errors import InvalidInput, NotConverged, TdcrError
+
+__all__ = [
+    "Backbone",
+    "InvalidInput",
+    "LinkageSettings",
+    "NotConverged",
+    "Robot",
+    "Shape",
+    "ShapeBatch",
+    "Status",
+    "TdcrError",
+    "Tendon",
+    "forward",
+    "forward_batch",
+]

@@ -1,0 +1,202 @@
+"""Many forward solves at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tdcr import _core
+from tdcr.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tdcr._core import LinkageSettings, Robot, Shape
+
+__all__ = ["ShapeBatch", "forward_batch"]
+
+FIELDS = (
+    "tip",
+    "frames",
+    "positions",
+    "strains",
+    "tendon_points",
+    "tendon_lengths",
+    "tensions",
+    "energy",
+)
+ALWAYS = ("status", "ok", "residual", "iterations")
+
+
+class ShapeBatch(Sequence["Shape"]):
+    """Shapes of one robot under many displacements, in the order of the rows.
+
+    The fields asked for are attributes, and so are `status` (B,), `ok` (B,), `residual` (B,) and
+    `iterations` (B,); reading a field that was not asked for raises. `batch[i]` is a `Shape`, solved
+    anew from its row: the same to the bit.
+
+    Attributes
+    ----------
+    robot : Robot
+    displacements : ndarray, shape (B, K)
+        Negative pulls [m].
+    tip : ndarray, shape (B, 4, 4)
+        Frame of the tip disk in the world.
+    frames : ndarray, shape (B, n + 1, 4, 4)
+        Frame of every disk.
+    positions : ndarray, shape (B, n + 1, 3)
+        Centre of every disk [m].
+    strains : ndarray, shape (B, n, 3)
+        Rotation vector of every element [rad].
+    tendon_points : list of ndarray, shape (B, end + 1, 3)
+        Holes of every tendon [m].
+    tendon_lengths : ndarray, shape (B, K)
+        [m].
+    tensions : ndarray, shape (B, K)
+        As in `Shape`.
+    energy : ndarray, shape (B,)
+        As in `Shape`.
+    status : ndarray of Status, shape (B,)
+    ok : ndarray of bool, shape (B,)
+        Whether the row converged.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        displacements: NDArray[np.float64],
+        model: str,
+        settings: LinkageSettings | None,
+        columns: dict[str, Any],
+    ) -> None:
+        self.robot = robot
+        self.displacements = displacements
+        self.model = model
+        self.settings = settings
+        self._columns = columns
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a computed field; tell how to get one that was not asked for."""
+        # Through __dict__: while a pickle is being read there is no _columns yet.
+        columns = self.__dict__.get("_columns", {})
+        if name in columns:
+            return columns[name]
+        if name in FIELDS:
+            raise AttributeError(
+                f"{name}: not computed; ask for it with forward_batch(..., "
+                f"fields={(*self.fields, name)!r})"
+            )
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    def __dir__(self) -> list[str]:
+        """List the computed fields too."""
+        return sorted({*super().__dir__(), *self._columns})
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the fields that were asked for."""
+        return tuple(name for name in FIELDS if name in self._columns)
+
+    def __len__(self) -> int:
+        """Return the number of rows B."""
+        return len(self.displacements)
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return the shape of one row, or a list of shapes for a slice."""
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        row = self.displacements[range(len(self))[index]]
+        return _core.forward(self.robot, row, model=self.model, settings=self.settings)
+
+    def __repr__(self) -> str:
+        """Tell size, outcome and fields."""
+        converged = int(np.count_nonzero(self._columns["ok"]))
+        return (
+            f"<ShapeBatch of {len(self)} rows, {converged} converged: "
+            f"fields {', '.join(self.fields) or 'none'}, model {self.model!r}>"
+        )
+
+
+def forward_batch(
+    robot: Robot,
+    displacements: ArrayLike,
+    *,
+    model: str,
+    settings: LinkageSettings | None = None,
+    fields: Sequence[str] = ("tip",),
+    threads: int | None = None,
+    progress: bool | Callable[[int], object] = False,
+) -> ShapeBatch:
+    """Solve many displacements on all cores, with the GIL released.
+
+    Parameters
+    ----------
+    robot : Robot
+    displacements : array_like, shape (B, K)
+        One row per solve, as for `forward` [m].
+    model, settings
+        As for `forward`.
+    fields : sequence of str, optional
+        What to compute of "tip", "frames", "positions", "strains", "tendon_points",
+        "tendon_lengths", "tensions", "energy". Status, residual and iterations always are.
+    threads : int, optional
+        Default: all cores. The answer does not depend on it.
+    progress : bool or callable, optional
+        True draws a progress bar on a terminal; a callable gets the number of rows done about every
+        50 ms.
+
+    Returns
+    -------
+    ShapeBatch
+        Every row in its place; one that did not converge has its status.
+
+    Raises
+    ------
+    InvalidInput
+        As `forward`, before any row is solved and naming the row; an unknown field, a number of
+        threads below 1.
+    KeyboardInterrupt
+        On Ctrl-C, within about 0.1 s.
+    """
+    if isinstance(fields, str):
+        fields = (fields,)
+    for field in fields:
+        if field not in FIELDS:
+            expected = ", ".join(FIELDS)
+            raise InvalidInput(f"fields: expected names of {expected}, got {field!r}", "fields")
+    rows = np.array(displacements, order="C")
+    with _told(progress, len(rows) if rows.ndim else 0) as tell:
+        columns = _core._forward_batch(
+            robot,
+            rows,
+            model=model,
+            settings=settings,
+            fields=list(fields),
+            threads=threads,
+            progress=tell,
+        )
+    rows = rows.astype(np.float64, copy=False)
+    rows.flags.writeable = False
+    return ShapeBatch(robot, rows, model, settings, columns)
+
+
+@contextmanager
+def _told(
+    progress: bool | Callable[[int], object], total: int
+) -> Iterator[Callable[[int], object] | None]:
+    """Give the callable that is told the rows done, or None."""
+    if callable(progress):
+        yield progress
+    elif progress:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+        columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=Console(stderr=True)) as bar:
+            task = bar.add_task("forward_batch", total=total)
+            yield lambda done: bar.update(task, completed=done)
+    else:
+        yield None

@@ -1,0 +1,7 @@
+//! Rotations SO(3), rigid motions SE(3), and their derivatives.
+
+mod pose;
+pub mod se3;
+pub mod so3;
+
+pub use pose::Pose;

@@ -1,0 +1,208 @@
+//! The chain of linkages from base to tip.
+
+use nalgebra::Vector3;
+
+use super::LinkageSettings;
+use super::drive::{Choice, Drive, Run, runs};
+use super::seven_bar::Hole;
+use super::subsegment::{Answer, Obstacle, Question};
+use crate::error::InvalidInput;
+use crate::lie::Pose;
+use crate::model::{Model, Report, State};
+use crate::robot::{Path, Robot};
+use crate::solve::sqp::{Ending, Settings};
+use crate::status::Status;
+
+/// A robot prepared for the linkage model: everything that does not depend on the displacements.
+#[derive(Clone, Debug)]
+pub struct Linkage<'r> {
+    pub(super) robot: &'r Robot,
+    settings: LinkageSettings,
+    pub(super) runs: Vec<Run>,
+    /// Pieces of every tendon, scaled to unit subsegments.
+    pieces: Vec<Vec<Hole>>,
+}
+
+/// Buffers of a solve, reused from one to the next.
+#[derive(Clone, Debug, Default)]
+pub struct Workspace {
+    pub(super) state: State,
+    pub(super) drives: Vec<Drive>,
+    pub(super) failure: Option<Failure>,
+}
+
+/// What failed first.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Failure {
+    /// Upper disk of the subsegment, its run and what is in the way.
+    Reach { disk: usize, run: usize, obstacle: Obstacle },
+    /// Upper disk of a subsegment whose solve did not converge.
+    Solve { disk: usize, ending: Ending },
+    /// Tendons outside the linkage are longer than they may be.
+    Bound,
+}
+
+/// Share of a tendon's rest length by which it may exceed its bound.
+const BOUND_TOLERANCE: f64 = 1e-9;
+
+impl<'r> Linkage<'r> {
+    /// Prepares a robot.
+    ///
+    /// # Errors
+    /// `InvalidInput` for settings out of range, or a backbone that is bent at rest: the linkages
+    /// are those of a straight one.
+    pub fn new(robot: &'r Robot, settings: LinkageSettings) -> Result<Self, InvalidInput> {
+        settings.validate()?;
+        if !robot.backbone().is_straight() {
+            let expected = "a backbone that is straight at rest for model \"linkage\"";
+            return Err(InvalidInput::new("robot.backbone.rest", expected, "a pre-bent one"));
+        }
+        let lengths = robot.backbone().lengths();
+        let pieces = (robot.paths().iter())
+            .map(|path| {
+                path.holes.windows(2).zip(lengths).map(|(pair, l)| piece(pair, *l)).collect()
+            })
+            .collect();
+        Ok(Self { robot, settings, runs: runs(robot), pieces })
+    }
+
+    fn chain(&self, displacements: &[f64], work: &mut Workspace, report: &mut Report) {
+        let Workspace { state, drives, failure } = work;
+        *failure = None;
+        let lengths = self.robot.backbone().lengths();
+        let settings = self.settings.sqp();
+        let mut frame = *self.robot.base();
+        let mut last: Option<(Question, Answer)> = None;
+        state.clear();
+        state.frames.push(frame);
+        for (index, run) in self.runs.iter().enumerate() {
+            for i in run.first..run.last {
+                let question = self.question(drives[index], i, displacements);
+                // Alike subsegments under alike pulls are one problem: it is solved once.
+                let answer = match last {
+                    Some((same, answer)) if same == question => answer,
+                    _ => {
+                        let (answer, failed) = answer(&question, &settings, (i + 1, index));
+                        report.residual = report.residual.max(answer.residual);
+                        report.iterations += answer.iterations;
+                        if let (Some((status, first)), None) = (failed, &failure) {
+                            report.status = status;
+                            *failure = Some(first);
+                        }
+                        last = Some((question, answer));
+                        answer
+                    }
+                };
+                frame = Pose {
+                    translation: frame.translation + frame.rotation * (answer.link * lengths[i]),
+                    rotation: frame.rotation * answer.rotation,
+                };
+                state.frames.push(frame);
+                state.strains.push(answer.rotation_vector);
+            }
+        }
+    }
+
+    fn question(&self, drive: Drive, subsegment: usize, displacements: &[f64]) -> Question {
+        let hole = |k: usize| {
+            let piece = self.pieces[k][subsegment];
+            let share = -displacements[k] / self.robot.paths()[k].rest_length;
+            Hole { pull: share * piece.rest_piece(), ..piece }
+        };
+        match drive {
+            Drive::None => Question::Straight,
+            Drive::One(k) => {
+                let hole = hole(k);
+                let azimuths = &self.robot.paths()[k].azimuths;
+                if azimuths[subsegment] == azimuths[subsegment + 1] {
+                    return Question::Planar(hole);
+                }
+                let quarter = |h: Vector3<f64>| Vector3::new(-h.y, h.x, 0.0);
+                let span =
+                    Hole { lower: quarter(hole.lower), upper: quarter(hole.upper), pull: 0.0 };
+                Question::Spatial([hole, span])
+            }
+            Drive::Two(a, b) => Question::Pair([hole(a), hole(b)]),
+        }
+    }
+
+    /// Tendons that are longer than their displacement allows.
+    pub(super) fn overlong<'a>(
+        &'a self,
+        displacements: &'a [f64],
+        state: &'a State,
+    ) -> impl Iterator<Item = usize> + 'a {
+        let bound = move |k: usize, path: &Path| {
+            path.rest_length * (1.0 + BOUND_TOLERANCE) + displacements[k]
+        };
+        (self.robot.paths().iter().enumerate())
+            .filter(move |(k, path)| state.tendon_lengths[*k] > bound(*k, path))
+            .map(|(k, _)| k)
+    }
+}
+
+impl Model for Linkage<'_> {
+    type Workspace = Workspace;
+
+    fn robot(&self) -> &Robot {
+        self.robot
+    }
+
+    fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+        let choice = Choice { robot: self.robot, pieces: &self.pieces, displacements };
+        work.drives.clear();
+        for run in &self.runs {
+            work.drives.push(choice.of(run)?);
+        }
+        let mut report = Report { status: Status::Converged, residual: 0.0, iterations: 0 };
+        self.chain(displacements, work, &mut report);
+        let state = &mut work.state;
+        let backbone = self.robot.backbone();
+        state.tendon_lengths.extend(self.robot.paths().iter().map(|p| p.length(&state.frames)));
+        state.tensions.resize(displacements.len(), f64::NAN);
+        state.energy =
+            state.strains.iter().enumerate().map(|(i, w)| backbone.strain_energy(i, w)).sum();
+        if work.failure.is_none() && self.overlong(displacements, &work.state).next().is_some() {
+            report.status = Status::Infeasible;
+            work.failure = Some(Failure::Bound);
+        }
+        Ok(report)
+    }
+
+    fn state<'w>(&self, work: &'w Workspace) -> &'w State {
+        &work.state
+    }
+
+    fn take_state(&self, work: Workspace) -> State {
+        work.state
+    }
+
+    fn message(&self, displacements: &[f64], work: &Workspace) -> String {
+        self.describe(displacements, work)
+    }
+}
+
+/// Solves one subsegment, given by its upper disk and its run.
+fn answer(
+    question: &Question,
+    settings: &Settings,
+    (disk, run): (usize, usize),
+) -> (Answer, Option<(Status, Failure)>) {
+    if let Some(obstacle) = question.obstacle() {
+        let failure = Failure::Reach { disk, run, obstacle };
+        return (question.stand_in(), Some((Status::Infeasible, failure)));
+    }
+    let answer = question.solve(settings);
+    let status = match answer.ending {
+        Ending::Converged => return (answer, None),
+        Ending::Infeasible => Status::Infeasible,
+        Ending::IterationLimit => Status::IterationLimit,
+        Ending::NumericalError => Status::NumericalError,
+    };
+    (answer, Some((status, Failure::Solve { disk, ending: answer.ending })))
+}
+
+/// A tendon piece between two disks, in units of the subsegment's length.
+fn piece(holes: &[Vector3<f64>], length: f64) -> Hole {
+    Hole { lower: holes[0] / length, upper: holes[1] / length, pull: 0.0 }
+}

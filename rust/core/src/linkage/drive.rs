@@ -1,0 +1,155 @@
+//! Which tendons form the linkage of each run of subsegments.
+
+use super::seven_bar::Hole;
+use crate::error::InvalidInput;
+use crate::robot::Robot;
+
+/// The tendons of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Drive {
+    /// None is pulled.
+    None,
+    /// One: a four-bar linkage.
+    One(usize),
+    /// Two: a seven-bar linkage.
+    Two(usize, usize),
+}
+
+/// Subsegments `first..last` that the same tendons pass.
+#[derive(Clone, Debug)]
+pub(super) struct Run {
+    pub(super) first: usize,
+    pub(super) last: usize,
+    /// How each pair of tendons stands, tendon by tendon.
+    pairs: Vec<Stand>,
+}
+
+/// How the holes of two tendons stand to each other on the disks of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stand {
+    /// On different lines through the centre on every disk: they can form a seven-bar.
+    Apart,
+    /// On the same azimuth on some disk.
+    Same,
+    /// On one line through the centre, on opposite sides, on some disk.
+    Opposite,
+}
+
+/// Sine of the angle between two holes below which they are on one line.
+const ON_ONE_LINE: f64 = 1e-9;
+
+/// Share of the run's length by which a bound must be missed to count.
+const BOUND_TOLERANCE: f64 = 1e-9;
+
+/// The runs of a robot, base first; behind the last tendon's end there is a run without tendons.
+pub(super) fn runs(robot: &Robot) -> Vec<Run> {
+    let n = robot.backbone().subsegments();
+    let mut ends: Vec<usize> = robot.paths().iter().map(crate::robot::Path::end).collect();
+    ends.push(n);
+    ends.sort_unstable();
+    ends.dedup();
+    let mut first = 0;
+    let mut runs = Vec::with_capacity(ends.len());
+    for last in ends {
+        runs.push(Run { first, last, pairs: stands(robot, first, last) });
+        first = last;
+    }
+    runs
+}
+
+fn stands(robot: &Robot, first: usize, last: usize) -> Vec<Stand> {
+    let paths = robot.paths();
+    let mut stands = Vec::with_capacity(paths.len() * paths.len());
+    for a in paths {
+        for b in paths {
+            let mut stand = Stand::Apart;
+            if a.end() >= last && b.end() >= last {
+                for disk in first..=last {
+                    let (sin, cos) = (b.azimuths[disk] - a.azimuths[disk]).sin_cos();
+                    if sin.abs() < ON_ONE_LINE {
+                        stand = if cos > 0.0 { Stand::Same } else { Stand::Opposite };
+                        break;
+                    }
+                }
+            }
+            stands.push(stand);
+        }
+    }
+    stands
+}
+
+/// What the choice looks at.
+pub(super) struct Choice<'a> {
+    pub(super) robot: &'a Robot,
+    /// Pieces of every tendon, scaled to unit subsegments.
+    pub(super) pieces: &'a [Vec<Hole>],
+    pub(super) displacements: &'a [f64],
+}
+
+impl Choice<'_> {
+    /// The two most-pulled tendons of a run that are not on one line through the centre; with one
+    /// pulled tendon, the one whose bound its bend would break, if there is one.
+    ///
+    /// # Errors
+    /// `InvalidInput` when the pulled tendons share one azimuth: a linkage needs two directions.
+    pub(super) fn of(&self, run: &Run) -> Result<Drive, InvalidInput> {
+        let tendons = self.displacements.len();
+        let Some(first) = self.most_pulled(run, |_| true) else { return Ok(Drive::None) };
+        let stand = |k: usize| run.pairs[first * tendons + k];
+        if let Some(second) = self.most_pulled(run, |k| k != first && stand(k) == Stand::Apart) {
+            return Ok(Drive::Two(first, second));
+        }
+        if let Some(twin) = self.most_pulled(run, |k| k != first && stand(k) == Stand::Same) {
+            return Err(self.same_azimuth(run, first, twin));
+        }
+        let taut = (0..tendons)
+            .filter(|&k| k != first && stand(k) == Stand::Apart)
+            .map(|k| (k, self.overstretch(run, first, k)))
+            .filter(|(_, overstretch)| *overstretch > BOUND_TOLERANCE)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        Ok(taut.map_or(Drive::One(first), |(second, _)| Drive::Two(first, second)))
+    }
+
+    /// The tendon with the largest shortening in proportion to its length.
+    fn most_pulled(&self, run: &Run, wanted: impl Fn(usize) -> bool) -> Option<usize> {
+        let paths = self.robot.paths();
+        let pull = |k: usize| -self.displacements[k] / paths[k].rest_length;
+        (0..paths.len())
+            .filter(|&k| paths[k].end() >= run.last && self.displacements[k] < 0.0 && wanted(k))
+            // Of equals the first: max_by would take the last.
+            .reduce(|best, k| if pull(k) > pull(best) { k } else { best })
+    }
+
+    /// By how much, as a share of its length in the run, the bend of `pulled` alone would stretch
+    /// tendon `k` beyond its bound; to first order. Free tendons have no bound.
+    fn overstretch(&self, run: &Run, pulled: usize, k: usize) -> f64 {
+        let path = &self.robot.paths()[k];
+        if path.end() < run.last || self.displacements[k].is_infinite() {
+            return f64::NEG_INFINITY;
+        }
+        let lengths = self.robot.backbone().lengths();
+        let ratio = -self.displacements[pulled] / self.robot.paths()[pulled].rest_length;
+        let (mut stretch, mut rest) = (0.0, 0.0);
+        for i in run.first..run.last {
+            let (a, b) = (&self.pieces[pulled][i], &self.pieces[k][i]);
+            let (arm, other) = (a.lower + a.upper, b.lower + b.upper);
+            let bend = ratio * a.rest_piece() / arm.norm_squared().max(f64::MIN_POSITIVE);
+            stretch -= lengths[i] * bend * arm.dot(&other);
+            rest += lengths[i] * b.rest_piece();
+        }
+        stretch / rest - self.displacements[k] / path.rest_length
+    }
+
+    fn same_azimuth(&self, run: &Run, first: usize, second: usize) -> InvalidInput {
+        let names = self.robot.tendon_names();
+        let (a, b) = (&names[first], &names[second]);
+        InvalidInput::new(
+            "displacements",
+            "linkage tendons on different azimuths (free one with inf, or use another model)",
+            format!(
+                "'{a}' and '{b}' pulled on one azimuth between disks {} and {}",
+                run.first, run.last
+            ),
+        )
+    }
+}

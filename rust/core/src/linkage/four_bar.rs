@@ -1,0 +1,111 @@
+//! The four-bar linkage: one subsegment in the plane of its one tendon.
+//!
+//! Ashwin & Ghosal (eq. 7) minimise the coupler angle over `x0, xa` (four coordinates) under three
+//! fixed lengths. The crank `|x0 - X0|` and the coupler `|x0 - xa|` leave two angles, the link's and
+//! the disk's; the tendon piece `|xa - Xa|` is the one equality left.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::seven_bar::Hole;
+use crate::solve::sqp::{Linearization, Problem};
+
+/// Minimum of the squared coupler angle of a planar subsegment. Lengths in units of the rest length
+/// of the subsegment; the tendon lies at `+x`.
+#[derive(Clone, Copy, Debug)]
+pub struct FourBar {
+    lower: f64,
+    upper: f64,
+    shortfall: f64,
+    /// Weight of the squared angles between crank and disk axes; see
+    /// [`SevenBar::new`](super::seven_bar::SevenBar::new).
+    bisection: f64,
+    crank_unit: f64,
+}
+
+/// Angles of a planar subsegment, positive towards the tendon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bend {
+    /// Turn of the upper disk against the lower one \[rad\].
+    pub disk: f64,
+    /// Direction of the link against the lower disk's axis \[rad\].
+    pub link: f64,
+}
+
+impl FourBar {
+    /// From a hole whose azimuth is the same on both disks.
+    #[must_use]
+    pub fn new(hole: &Hole) -> Self {
+        let (lower, upper) = (hole.lower.norm(), hole.upper.norm());
+        let shortfall = hole.pull * (hole.rest_piece() - 0.5 * hole.pull);
+        let alike = hole.lower == hole.upper;
+        let unit = if alike { 1.0 / (shortfall / upper).abs().clamp(1e-140, 1.0) } else { 1.0 };
+        Self { lower, upper, shortfall, bisection: if alike { 0.0 } else { 1.0 }, crank_unit: unit }
+    }
+
+    /// Bent as the linear theory of tendons has it.
+    #[must_use]
+    pub fn start(&self) -> Bend {
+        let disk = (2.0 * self.shortfall / (self.lower + self.upper)).min(2.0);
+        Bend { disk, link: 0.5 * disk }
+    }
+}
+
+impl Problem<2, 1> for FourBar {
+    type Point = Bend;
+
+    fn linearize(&self, b: &Bend) -> Linearization<2, 1> {
+        let (sin, cos) = b.disk.sin_cos();
+        let (link_sin, link_cos) = b.link.sin_cos();
+        let (half_sin, half_cos) = (0.5 * b.disk).sin_cos();
+        let offset = self.upper - self.lower;
+        // (R - I) h' without cancellation.
+        let moved =
+            [-2.0 * self.upper * half_sin * half_sin, -2.0 * self.upper * half_sin * half_cos];
+        let shift = [moved[0] + offset, moved[1]];
+        let along = link_sin * shift[0] + link_cos * shift[1];
+        let across = link_cos * shift[0] - link_sin * shift[1];
+        let squares = 0.5 * (moved[0] * moved[0] + moved[1] * moved[1]) + moved[0] * offset;
+        // d(R h')/d(disk) = -upper (sin, cos), dotted with link - lower hole.
+        let turn = -self.upper * (sin * (link_sin - self.lower) + cos * link_cos);
+        let (tilt, w) = (b.disk - b.link, self.bisection);
+        Linearization {
+            objective: b.disk * b.disk + w * (b.link * b.link + tilt * tilt),
+            gradient: SVector::from([
+                2.0 * b.disk + 2.0 * w * tilt,
+                2.0 * w * (b.link - tilt) * self.crank_unit,
+            ]),
+            constraints: SVector::from([(along + squares + self.shortfall) / self.upper]),
+            jacobian_transposed: SMatrix::from([[
+                turn / self.upper,
+                across * self.crank_unit / self.upper,
+            ]]),
+        }
+    }
+
+    fn hessian(&self, b: &Bend, multipliers: &SVector<f64, 1>) -> SMatrix<f64, 2, 2> {
+        let (sin, cos) = b.disk.sin_cos();
+        let (link_sin, link_cos) = b.link.sin_cos();
+        let half_sin = (0.5 * b.disk).sin();
+        let shift =
+            [self.upper - self.lower - 2.0 * self.upper * half_sin * half_sin, -self.upper * sin];
+        let (w, unit) = (self.bisection, self.crank_unit);
+        let lambda = multipliers[0] / self.upper;
+        let disk = lambda * self.upper * (sin * link_cos - cos * (link_sin - self.lower));
+        let mixed = lambda * self.upper * (cos * link_sin - sin * link_cos);
+        let link = -lambda * (link_sin * shift[0] + link_cos * shift[1]);
+        let cross = (mixed - 2.0 * w) * unit;
+        SMatrix::from([[2.0 + 2.0 * w + disk, cross], [cross, (4.0 * w + link) * unit * unit]])
+    }
+
+    fn retract(&self, b: &Bend, step: &SVector<f64, 2>) -> Bend {
+        Bend { disk: b.disk + step[0], link: b.link + step[1] * self.crank_unit }
+    }
+
+    fn admissible(&self, b: &Bend) -> bool {
+        b.link.cos() + (b.disk - b.link).cos() > 0.0
+    }
+
+    fn step_size(&self, step: &SVector<f64, 2>) -> f64 {
+        step[0].abs().max((step[1] * self.crank_unit).abs())
+    }
+}

@@ -1,0 +1,377 @@
+//! The seven-bar linkage: one subsegment in space with one or two tendons.
+//!
+//! Ashwin & Ghosal (eqs. 9-14) state it in nine coordinates, the points `x0, xa, xb` of the upper
+//! disk, under six equalities: the crank `|x0 - X0|`, the couplers `|x0 - xa|` and `|x0 - xb|`, the
+//! angle between them, and the tendon pieces `|xa - Xa|`, `|xb - Xb|`. The first four say that the
+//! crank is a direction `d` and the couplers are turned by one rotation `R`; writing the points as
+//! `x0 = l0 d`, `xj = l0 d + R h'_j` meets them identically, and five coordinates under two
+//! equalities remain (`docs/linkage.md`). All lengths here are divided by the rest length `l0`.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::angle::SquaredAngle;
+use crate::solve::sqp::{Linearization, Problem};
+
+/// A tendon hole on the lower and the upper disk of a subsegment, and the pull on its piece.
+/// Lengths in units of the rest length of the subsegment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hole {
+    /// Place in the lower disk's frame.
+    pub lower: Vector3<f64>,
+    /// Place in the upper disk's frame.
+    pub upper: Vector3<f64>,
+    /// Shortening of the tendon piece from its rest length, positive when pulled.
+    pub pull: f64,
+}
+
+impl Hole {
+    /// Rest length of the tendon piece in a straight subsegment.
+    #[must_use]
+    pub fn rest_piece(&self) -> f64 {
+        (1.0 + (self.upper - self.lower).norm_squared()).sqrt()
+    }
+}
+
+/// Constants of one hole, worked out once per subsegment.
+#[derive(Clone, Copy, Debug)]
+struct Coupler {
+    lower: Vector3<f64>,
+    upper: Vector3<f64>,
+    offset: Vector3<f64>,
+    direction: Vector3<f64>,
+    /// `(rest^2 - wanted^2) / 2` without cancellation.
+    shortfall: f64,
+    scale: f64,
+    pull: f64,
+}
+
+impl Coupler {
+    fn new(hole: &Hole) -> Self {
+        let scale = 1.0 / hole.upper.norm();
+        Self {
+            lower: hole.lower,
+            upper: hole.upper,
+            offset: hole.upper - hole.lower,
+            direction: hole.upper * scale,
+            shortfall: hole.pull * (hole.rest_piece() - 0.5 * hole.pull),
+            scale,
+            pull: hole.pull,
+        }
+    }
+}
+
+/// Minimum of the squared coupler angles of two holes, of which the first `M` carry a tendon.
+#[derive(Clone, Copy, Debug)]
+pub struct SevenBar<const M: usize> {
+    couplers: [Coupler; 2],
+    /// Weight of the squared angles between crank and disk axes.
+    bisection: f64,
+    /// Length of a unit of the crank's local coordinates.
+    crank_unit: f64,
+}
+
+/// A pose of the upper disk: link direction and disk rotation, with what both derivatives need.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose {
+    /// Unit vector from the lower to the upper disk centre, in the lower disk's frame.
+    pub link: Vector3<f64>,
+    /// Unit quaternion `[w, x, y, z]` of the upper disk in the lower disk's frame.
+    quaternion: [f64; 4],
+    /// `R - I`, kept apart so that a small turn keeps its digits.
+    turn: Matrix3<f64>,
+    /// Tangent basis of the sphere at `link`.
+    basis: [Vector3<f64>; 2],
+}
+
+impl Pose {
+    /// From a link direction and a rotation vector of the upper disk \[rad\].
+    #[must_use]
+    pub fn new(link: &Vector3<f64>, rotation: &Vector3<f64>) -> Self {
+        let angle = rotation.norm();
+        let (sin, cos) = (0.5 * angle).sin_cos();
+        let v = if angle > 1e-150 { rotation * (sin / angle) } else { rotation * 0.5 };
+        Self::from_parts(link.normalize(), [cos, v.x, v.y, v.z])
+    }
+
+    /// The straight subsegment.
+    #[must_use]
+    pub fn straight() -> Self {
+        Self::from_parts(Vector3::z(), [1.0, 0.0, 0.0, 0.0])
+    }
+
+    /// Bent by `angle` \[rad\] towards `azimuth` \[rad\] with the link at half the bend.
+    #[must_use]
+    pub fn bent(angle: f64, azimuth: f64) -> Self {
+        let (s, c) = azimuth.sin_cos();
+        let (half_sin, half_cos) = (0.5 * angle).sin_cos();
+        Self::from_parts(
+            Vector3::new(half_sin * c, half_sin * s, half_cos),
+            [half_cos, -half_sin * s, half_sin * c, 0.0],
+        )
+    }
+
+    fn from_parts(link: Vector3<f64>, quaternion: [f64; 4]) -> Self {
+        let [w, x, y, z] = quaternion;
+        let (xx, yy, zz) = (x * x, y * y, z * z);
+        let (xy, xz, yz) = (x * y, x * z, y * z);
+        let (wx, wy, wz) = (w * x, w * y, w * z);
+        let turn = Matrix3::new(
+            -2.0 * (yy + zz),
+            2.0 * (xy - wz),
+            2.0 * (xz + wy), //
+            2.0 * (xy + wz),
+            -2.0 * (xx + zz),
+            2.0 * (yz - wx), //
+            2.0 * (xz - wy),
+            2.0 * (yz + wx),
+            -2.0 * (xx + yy),
+        );
+        Self { link, quaternion, turn, basis: tangents(&link) }
+    }
+
+    /// Rotation matrix of the upper disk in the lower disk's frame.
+    #[must_use]
+    pub fn rotation(&self) -> Matrix3<f64> {
+        self.turn + Matrix3::identity()
+    }
+
+    /// Rotation vector of the upper disk in the lower disk's frame \[rad\].
+    #[must_use]
+    pub fn rotation_vector(&self) -> Vector3<f64> {
+        let [w, x, y, z] = self.quaternion;
+        let v = if w < 0.0 { -Vector3::new(x, y, z) } else { Vector3::new(x, y, z) };
+        let sine = v.norm();
+        if sine < 1e-150 {
+            return v * 2.0;
+        }
+        v * (2.0 * sine.atan2(w.abs()) / sine)
+    }
+}
+
+/// Two unit vectors that complete `n` to a right-handed frame (Duff et al., JCGT 6(1), 2017).
+fn tangents(n: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let sign = 1.0_f64.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    [
+        Vector3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+        Vector3::new(b, sign + n.y * n.y * a, -n.y),
+    ]
+}
+
+impl<const M: usize> SevenBar<M> {
+    /// From the two holes that span the upper disk; the first `M` carry tendons.
+    ///
+    /// Where the holes of both disks are alike the objective is the paper's. Where they differ, the
+    /// coupler angles alone have no useful minimum (a sheared subsegment takes up the pull at angle
+    /// zero), and the angles between crank and disk axes are added; at equal holes both have the same
+    /// minimiser.
+    #[must_use]
+    pub fn new(holes: &[Hole; 2]) -> Self {
+        let couplers = [Coupler::new(&holes[0]), Coupler::new(&holes[1])];
+        let alike = couplers[..M].iter().all(|c| c.offset == Vector3::zeros());
+        let mut unit = 1.0;
+        if alike {
+            // The coupler angles do not see the crank at rest; its curvature grows with the square of
+            // the bend. In units of 1/bend the problem is well scaled down to the smallest pull.
+            let bend =
+                couplers[..M].iter().fold(0.0_f64, |b, c| b.max((c.shortfall * c.scale).abs()));
+            unit = 1.0 / bend.clamp(1e-140, 1.0);
+        }
+        Self { couplers, bisection: if alike { 0.0 } else { 1.0 }, crank_unit: unit }
+    }
+
+    /// Bent as the linear theory of tendons has it, link at half the bend: on the right side of the
+    /// mirror, and not the answer.
+    #[must_use]
+    pub fn start(&self) -> Pose {
+        let (c, s) = self.linear_bend();
+        Pose::bent(c.hypot(s).min(2.0), s.atan2(c))
+    }
+
+    /// `(bend cos, bend sin)` to first order: `hole . (c, s) = pull` at the mean hole.
+    pub(super) fn linear_bend(&self) -> (f64, f64) {
+        let row = |c: &Coupler| (0.5 * (c.lower + c.upper), c.pull);
+        let (a, pull_a) = row(&self.couplers[0]);
+        if M == 1 {
+            let factor = pull_a / (a.x * a.x + a.y * a.y).max(f64::MIN_POSITIVE);
+            return (factor * a.x, factor * a.y);
+        }
+        let (b, pull_b) = row(&self.couplers[1]);
+        let determinant = a.x * b.y - a.y * b.x;
+        ((pull_a * b.y - pull_b * a.y) / determinant, (a.x * pull_b - b.x * pull_a) / determinant)
+    }
+}
+
+/// Quadratic form of the second derivative of `R(w) q . m` by the rotation vector `w`.
+#[inline]
+fn rotation_hessian(q: &Vector3<f64>, m: &Vector3<f64>) -> Matrix3<f64> {
+    let outer = m * q.transpose();
+    (outer + outer.transpose()) * 0.5 - Matrix3::from_diagonal_element(q.dot(m))
+}
+
+impl<const M: usize> Problem<5, M> for SevenBar<M> {
+    type Point = Pose;
+
+    #[inline]
+    fn linearize(&self, p: &Pose) -> Linearization<5, M> {
+        let mut out = Linearization::<5, M> {
+            objective: 0.0,
+            gradient: SVector::zeros(),
+            constraints: SVector::zeros(),
+            jacobian_transposed: SMatrix::zeros(),
+        };
+        let mut by_rotation = Vector3::zeros();
+        for (j, c) in self.couplers.iter().enumerate() {
+            let moved = p.turn * c.upper;
+            let turned = c.upper + moved;
+            let angle =
+                SquaredAngle::from_squared_distance(moved.norm_squared() * c.scale * c.scale);
+            out.objective += angle.value;
+            // moved x u, not turned x u: parallel vectors would leave only their rounding.
+            by_rotation -= moved.cross(&c.direction) * (2.0 * angle.first * c.scale);
+            if j < M {
+                let shift = moved + c.offset;
+                out.constraints[j] = c.scale
+                    * (p.link.dot(&shift) + moved.dot(&(moved * 0.5 + c.offset)) + c.shortfall);
+                let turn = turned.cross(&(p.link - c.lower)) * c.scale;
+                let unit = c.scale * self.crank_unit;
+                let column = [
+                    turn.x,
+                    turn.y,
+                    turn.z,
+                    p.basis[0].dot(&shift) * unit,
+                    p.basis[1].dot(&shift) * unit,
+                ];
+                out.jacobian_transposed.column_mut(j).copy_from(&SVector::<f64, 5>::from(column));
+            }
+        }
+        if self.bisection > 0.0 {
+            let (value, rotation, crank) = axes_gradient(p);
+            out.objective += self.bisection * value;
+            by_rotation += rotation * self.bisection;
+            for k in 0..2 {
+                out.gradient[3 + k] = self.bisection * self.crank_unit * crank.dot(&p.basis[k]);
+            }
+        }
+        out.gradient.fixed_rows_mut::<3>(0).copy_from(&by_rotation);
+        out
+    }
+
+    #[inline]
+    fn hessian(&self, p: &Pose, multipliers: &SVector<f64, M>) -> SMatrix<f64, 5, 5> {
+        let mut rotation = Matrix3::zeros();
+        let mut mixed = Vector3::zeros();
+        let mut crank = 0.0;
+        for (j, c) in self.couplers.iter().enumerate() {
+            let moved = p.turn * c.upper;
+            let turned = c.upper + moved;
+            let q = turned * c.scale;
+            let angle =
+                SquaredAngle::from_squared_distance(moved.norm_squared() * c.scale * c.scale);
+            let slope = moved.cross(&c.direction) * c.scale;
+            rotation += slope * slope.transpose() * (4.0 * angle.second)
+                - rotation_hessian(&q, &c.direction) * (2.0 * angle.first);
+            if j < M {
+                let weight = multipliers[j] * c.scale;
+                rotation += rotation_hessian(&turned, &(p.link - c.lower)) * weight;
+                mixed += turned * weight;
+                crank -= weight * p.link.dot(&(moved + c.offset));
+            }
+        }
+        let unit = self.crank_unit;
+        let mut h = SMatrix::<f64, 5, 5>::zeros();
+        for k in 0..2 {
+            let column = mixed.cross(&p.basis[k]) * unit;
+            for i in 0..3 {
+                h[(i, 3 + k)] = column[i];
+                h[(3 + k, i)] = column[i];
+            }
+            h[(3 + k, 3 + k)] = crank * unit * unit;
+        }
+        if self.bisection > 0.0 {
+            add_axes_hessian(p, self.bisection, unit, &mut rotation, &mut h);
+        }
+        h.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+        h
+    }
+
+    #[inline]
+    fn retract(&self, p: &Pose, step: &SVector<f64, 5>) -> Pose {
+        let unit = self.crank_unit;
+        let link = p.link + p.basis[0] * (step[3] * unit) + p.basis[1] * (step[4] * unit);
+        let [w, x, y, z] = p.quaternion;
+        let (a, b, c) = (0.5 * step[0], 0.5 * step[1], 0.5 * step[2]);
+        // (1, step/2) normalised agrees with Exp(step) to second order.
+        let q = [
+            w - a * x - b * y - c * z,
+            x + a * w + b * z - c * y,
+            y + b * w + c * x - a * z,
+            z + c * w + a * y - b * x,
+        ];
+        let length = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+        Pose::from_parts(link.normalize(), q.map(|e| e / length))
+    }
+
+    #[inline]
+    fn admissible(&self, p: &Pose) -> bool {
+        // The mirror branch has its link on the far side of the bend: behind both disk axes.
+        p.link.z + p.link.dot(&(p.turn.column(2) + Vector3::z())) > 0.0
+    }
+
+    #[inline]
+    fn step_size(&self, step: &SVector<f64, 5>) -> f64 {
+        let turn = step.fixed_rows::<3>(0).amax();
+        turn.max(step.fixed_rows::<2>(3).amax() * self.crank_unit)
+    }
+}
+
+/// Squared angles of the crank with the lower and the upper disk axis: sum, gradient by the rotation
+/// and (unprojected) by the link direction.
+fn axes_gradient(p: &Pose) -> (f64, Vector3<f64>, Vector3<f64>) {
+    let lower = Vector3::z();
+    let upper = lower + p.turn.column(2);
+    let f0 = SquaredAngle::from_squared_distance((p.link - lower).norm_squared());
+    let f1 = SquaredAngle::from_squared_distance((p.link - upper).norm_squared());
+    (
+        f0.value + f1.value,
+        upper.cross(&p.link) * (-2.0 * f1.first),
+        lower * (-2.0 * f0.first) + upper * (-2.0 * f1.first),
+    )
+}
+
+/// Second derivatives of [`axes_gradient`]'s sum.
+fn add_axes_hessian(
+    p: &Pose,
+    weight: f64,
+    unit: f64,
+    rotation: &mut Matrix3<f64>,
+    h: &mut SMatrix<f64, 5, 5>,
+) {
+    let lower = Vector3::z();
+    let upper = lower + p.turn.column(2);
+    let f0 = SquaredAngle::from_squared_distance((p.link - lower).norm_squared());
+    let f1 = SquaredAngle::from_squared_distance((p.link - upper).norm_squared());
+    let slope = upper.cross(&p.link);
+    *rotation += (slope * slope.transpose() * (4.0 * f1.second)
+        - rotation_hessian(&upper, &p.link) * (2.0 * f1.first))
+        * weight;
+    let curvature = 2.0 * (f0.first * lower.dot(&p.link) + f1.first * upper.dot(&p.link));
+    for k in 0..2 {
+        let along = upper.dot(&p.basis[k]);
+        let column = (slope * (4.0 * f1.second * along)
+            - upper.cross(&p.basis[k]) * (2.0 * f1.first))
+            * (weight * unit);
+        for i in 0..3 {
+            h[(i, 3 + k)] += column[i];
+            h[(3 + k, i)] += column[i];
+        }
+        for l in 0..2 {
+            let other = 4.0
+                * (f0.second * lower.dot(&p.basis[k]) * lower.dot(&p.basis[l])
+                    + f1.second * along * upper.dot(&p.basis[l]));
+            h[(3 + k, 3 + l)] += weight * unit * unit * other;
+        }
+        h[(3 + k, 3 + k)] += weight * unit * unit * curvature;
+    }
+}

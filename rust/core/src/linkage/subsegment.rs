@@ -1,0 +1,188 @@
+//! One subsegment of the chain: which linkage it is, and its pose.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::four_bar::FourBar;
+use super::seven_bar::{Hole, Pose, SevenBar};
+use crate::solve::sqp::{self, Ending, Problem, Settings, Solution};
+
+/// What is asked of a subsegment; equal questions have equal answers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Question {
+    /// No tendon pulls: straight, by definition.
+    Straight,
+    /// One tendon whose azimuth is the same on both disks.
+    Planar(Hole),
+    /// One tendon whose azimuth changes; the second hole carries none and only spans the disk.
+    Spatial([Hole; 2]),
+    /// Two tendons.
+    Pair([Hole; 2]),
+}
+
+/// Pose of the upper disk in the frame of the lower one, for a unit subsegment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Answer {
+    pub(super) rotation: Matrix3<f64>,
+    pub(super) rotation_vector: Vector3<f64>,
+    pub(super) link: Vector3<f64>,
+    pub(super) ending: Ending,
+    pub(super) residual: f64,
+    pub(super) iterations: usize,
+}
+
+/// Why a subsegment cannot follow its tendons, known before it is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Obstacle {
+    /// Half the norm of `(c, s)` reaches 1: the sine of half the bend.
+    Bend(f64),
+    /// A hole (0 or 1) whose tendon piece would have no length left.
+    Piece(usize),
+}
+
+impl Question {
+    /// The bound of the exact answer, where there is one (Ashwin & Ghosal, eq. 8, for one tendon;
+    /// `docs/linkage.md` for two), and the length of the pieces.
+    pub(super) fn obstacle(&self) -> Option<Obstacle> {
+        let too_short = |hole: &Hole| hole.pull >= hole.rest_piece();
+        let alike = |hole: &Hole| hole.lower == hole.upper;
+        let (holes, bound) = match self {
+            Self::Straight => return None,
+            Self::Planar(hole) => {
+                let bound = alike(hole).then(|| 0.5 * hole.pull / hole.upper.norm());
+                (std::slice::from_ref(hole), bound)
+            }
+            Self::Spatial(holes) => (&holes[..1], None),
+            Self::Pair(holes) => {
+                let bound = (alike(&holes[0]) && alike(&holes[1])).then(|| {
+                    let (c, s) = SevenBar::<2>::new(holes).linear_bend();
+                    0.5 * c.hypot(s)
+                });
+                (&holes[..], bound)
+            }
+        };
+        // Written so that a NaN counts as out of reach.
+        if let Some(half) =
+            bound.filter(|half| !matches!(half.partial_cmp(&1.0), Some(o) if o.is_lt()))
+        {
+            return Some(Obstacle::Bend(half));
+        }
+        holes.iter().position(too_short).map(Obstacle::Piece)
+    }
+
+    /// Solves the linkage.
+    pub(super) fn solve(&self, settings: &Settings) -> Answer {
+        match self {
+            Self::Straight => Answer::new(&Pose::straight(), Ending::Converged, 0.0, 0),
+            Self::Planar(hole) => {
+                let found = solve_four_bar(hole, settings);
+                let azimuth = hole.upper / hole.upper.norm();
+                let (sin, cos) = found.point.link.sin_cos();
+                let link = azimuth * sin + Vector3::z() * cos;
+                let turn = Vector3::new(-azimuth.y, azimuth.x, 0.0) * found.point.disk;
+                Answer::from_solution(&Pose::new(&link, &turn), &found)
+            }
+            Self::Spatial(holes) => {
+                let found = solve_seven_bar::<1>(holes, settings, None);
+                Answer::from_solution(&found.point, &found)
+            }
+            Self::Pair(holes) => {
+                let found = solve_seven_bar::<2>(holes, settings, None);
+                Answer::from_solution(&found.point, &found)
+            }
+        }
+    }
+
+    /// The pose to go on with where there is no answer: bent as far as the start goes.
+    pub(super) fn stand_in(&self) -> Answer {
+        let pose = match self {
+            Self::Straight => Pose::straight(),
+            Self::Planar(hole) => {
+                let bend = FourBar::new(hole).start();
+                Pose::bent(bend.disk, hole.upper.y.atan2(hole.upper.x))
+            }
+            Self::Spatial(holes) => SevenBar::<1>::new(holes).start(),
+            Self::Pair(holes) => SevenBar::<2>::new(holes).start(),
+        };
+        Answer::new(&pose, Ending::Infeasible, 0.0, 0)
+    }
+}
+
+impl Answer {
+    fn new(pose: &Pose, ending: Ending, residual: f64, iterations: usize) -> Self {
+        Self {
+            rotation: pose.rotation(),
+            rotation_vector: pose.rotation_vector(),
+            link: pose.link,
+            ending,
+            residual,
+            iterations,
+        }
+    }
+
+    fn from_solution<P, const M: usize>(pose: &Pose, found: &Solution<P, M>) -> Self {
+        let residual = found.violation.max(found.stationarity);
+        Self::new(pose, found.ending, residual, found.iterations)
+    }
+}
+
+/// The four-bar linkage from its own start.
+#[must_use]
+pub fn solve_four_bar(hole: &Hole, settings: &Settings) -> Solution<super::four_bar::Bend, 1> {
+    let problem = FourBar::new(hole);
+    let found = sqp::minimize(&problem, problem.start(), settings);
+    in_steps(found, settings, |share, from| {
+        let problem = FourBar::new(&Hole { pull: share * hole.pull, ..*hole });
+        (problem, from.unwrap_or_else(|| problem.start()))
+    })
+}
+
+/// The seven-bar linkage with tendons in its first `M` holes, from `start` or its own. A start that
+/// leads nowhere (the mirror branch, say) falls back to its own.
+#[must_use]
+pub fn solve_seven_bar<const M: usize>(
+    holes: &[Hole; 2],
+    settings: &Settings,
+    start: Option<Pose>,
+) -> Solution<Pose, M> {
+    let problem = SevenBar::<M>::new(holes);
+    let mut found = sqp::minimize(&problem, start.unwrap_or_else(|| problem.start()), settings);
+    if start.is_some() && found.ending != Ending::Converged {
+        let spent = found.iterations;
+        found = sqp::minimize(&problem, problem.start(), settings);
+        found.iterations += spent;
+    }
+    in_steps(found, settings, |share, from| {
+        let pulled = holes.map(|hole| Hole { pull: share * hole.pull, ..hole });
+        let problem = SevenBar::<M>::new(&pulled);
+        (problem, from.unwrap_or_else(|| problem.start()))
+    })
+}
+
+/// Steps of the fallback along the pull.
+const STEPS: usize = 8;
+
+/// Where one solve from the start failed: along the pull in equal steps, each from the last answer.
+fn in_steps<const N: usize, const M: usize, P: Problem<N, M>>(
+    found: Solution<P::Point, M>,
+    settings: &Settings,
+    at: impl Fn(f64, Option<P::Point>) -> (P, P::Point),
+) -> Solution<P::Point, M> {
+    if found.ending == Ending::Converged {
+        return found;
+    }
+    let mut iterations = found.iterations;
+    let mut from = None;
+    for step in 1..=STEPS {
+        let (problem, start) = at(step as f64 / STEPS as f64, from);
+        let mut next = sqp::minimize(&problem, start, settings);
+        iterations += next.iterations;
+        if step == STEPS || next.ending != Ending::Converged {
+            next.iterations = iterations;
+            // A failure on the way says nothing about the whole pull: keep the first one's.
+            let done = step == STEPS && next.ending == Ending::Converged;
+            return if done { next } else { Solution { iterations, ..found } };
+        }
+        from = Some(next.point);
+    }
+    found
+}

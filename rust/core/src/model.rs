@@ -1,0 +1,87 @@
+//! What every forward model offers: a solve into reusable buffers, and the whole result from it.
+
+use nalgebra::Vector3;
+
+use crate::error::InvalidInput;
+use crate::lie::Pose;
+use crate::robot::Robot;
+use crate::shape::Shape;
+use crate::status::Status;
+
+/// The solved quantities, in buffers that are reused from one solve to the next.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    /// Frame of every disk in the world, disk 0 first.
+    pub frames: Vec<Pose>,
+    /// Rotation vector of every element in the frame of its own base \[rad\].
+    pub strains: Vec<Vector3<f64>>,
+    /// Length of every tendon from the base to its end \[m\].
+    pub tendon_lengths: Vec<f64>,
+    /// Tension of every tendon; NaN in models that know no forces.
+    pub tensions: Vec<f64>,
+    /// Strain energy of the backbone \[J, or 1/m in units of EI\].
+    pub energy: f64,
+}
+
+impl State {
+    /// Empties the buffers, keeping their memory.
+    pub fn clear(&mut self) {
+        self.frames.clear();
+        self.strains.clear();
+        self.tendon_lengths.clear();
+        self.tensions.clear();
+        self.energy = 0.0;
+    }
+}
+
+/// How a solve ended, without any text.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Report {
+    /// The outcome.
+    pub status: Status,
+    /// Largest violation of the model's conditions, relative.
+    pub residual: f64,
+    /// Newton steps taken, all subsegments together.
+    pub iterations: usize,
+}
+
+/// A robot prepared for one forward model.
+pub trait Model: Sync {
+    /// Buffers of a solve.
+    type Workspace: Default + Send;
+
+    /// The robot it was prepared from.
+    fn robot(&self) -> &Robot;
+
+    /// Solves for checked displacements \[m\]; see [`Robot::check_displacements`]. A solve that does
+    /// not converge is a report, with the last iterate in the state.
+    ///
+    /// # Errors
+    /// `InvalidInput` for displacements that the model does not take.
+    fn solve(
+        &self,
+        displacements: &[f64],
+        work: &mut Self::Workspace,
+    ) -> Result<Report, InvalidInput>;
+
+    /// The solved quantities of the last solve in `work`.
+    fn state<'w>(&self, work: &'w Self::Workspace) -> &'w State;
+
+    /// The buffers' quantities, taken out of them.
+    fn take_state(&self, work: Self::Workspace) -> State;
+
+    /// What stood in the way of the last solve, in a sentence; empty when it converged.
+    fn message(&self, displacements: &[f64], work: &Self::Workspace) -> String;
+
+    /// Solves once and builds the whole result.
+    ///
+    /// # Errors
+    /// As [`Model::solve`], and for displacements that do not fit the robot.
+    fn shape(&self, displacements: &[f64]) -> Result<Shape, InvalidInput> {
+        self.robot().check_displacements(displacements)?;
+        let mut work = Self::Workspace::default();
+        let report = self.solve(displacements, &mut work)?;
+        let message = self.message(displacements, &work);
+        Ok(Shape { state: self.take_state(work), report, message })
+    }
+}

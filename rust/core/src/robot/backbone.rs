@@ -1,0 +1,229 @@
+//! The flexible spine: stretches of subsegments, rest shape, material.
+
+use std::f64::consts::PI;
+
+use nalgebra::Vector3;
+
+use super::bits::{Bits, hash_by_bits};
+use crate::error::{InvalidInput, finite, positive};
+
+/// What a backbone is described by, before it is checked. See [`Backbone::new`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct BackboneSpec {
+    /// Length of each stretch \[m\].
+    pub length: Vec<f64>,
+    /// Number of subsegments of each stretch.
+    pub subsegments: Vec<usize>,
+    /// Poisson's ratio of the material.
+    pub poisson_ratio: f64,
+    /// Rest rotation vector of each subsegment, in the frame of its base disk \[rad\]; none = straight.
+    pub rest: Option<Vec<Vector3<f64>>>,
+    /// Young's modulus \[Pa\].
+    pub youngs_modulus: Option<f64>,
+    /// Diameter of the round backbone, one or one per subsegment \[m\].
+    pub diameter: Option<Vec<f64>>,
+    /// Outer radius of the disks \[m\].
+    pub disk_radius: Option<f64>,
+}
+
+impl BackboneSpec {
+    /// One straight stretch of unknown material.
+    #[must_use]
+    pub fn straight(length: f64, subsegments: usize) -> Self {
+        Self {
+            length: vec![length],
+            subsegments: vec![subsegments],
+            poisson_ratio: 0.35,
+            rest: None,
+            youngs_modulus: None,
+            diameter: None,
+            disk_radius: None,
+        }
+    }
+}
+
+/// A checked backbone. Disks are numbered 0 (base) to n (tip); subsegment i joins disks i and i + 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Backbone {
+    spec: BackboneSpec,
+    lengths: Vec<f64>,
+    arc_lengths: Vec<f64>,
+}
+
+impl Backbone {
+    /// Checks a description.
+    ///
+    /// # Errors
+    /// `InvalidInput` naming the field: no stretch, a length that is not positive, a stretch without
+    /// subsegments, Poisson's ratio outside (-1, 0.5], a rest shape of another length than the
+    /// backbone or bent by more than pi per subsegment, Young's modulus without diameter, a
+    /// modulus, diameter or disk radius that is not positive.
+    pub fn new(mut spec: BackboneSpec) -> Result<Self, InvalidInput> {
+        let stretches = spec.length.len();
+        if stretches == 0 {
+            return Err(InvalidInput::new("length", "at least one stretch", "none"));
+        }
+        if spec.subsegments.len() != stretches {
+            let expected = format!("{stretches} counts, one per stretch of length");
+            return Err(InvalidInput::new("subsegments", expected, spec.subsegments.len()));
+        }
+        for &length in &spec.length {
+            positive("length", "m", length)?;
+        }
+        if let Some(count) = spec.subsegments.iter().find(|&&count| count < 1) {
+            return Err(InvalidInput::new("subsegments", "at least 1 per stretch", count));
+        }
+        let n: usize = spec.subsegments.iter().sum();
+        spec.poisson_ratio = finite("poisson_ratio", "1", spec.poisson_ratio)?;
+        if spec.poisson_ratio <= -1.0 || spec.poisson_ratio > 0.5 {
+            let got = spec.poisson_ratio;
+            return Err(InvalidInput::new("poisson_ratio", "a number in (-1, 0.5]", got));
+        }
+        if let Some(rest) = &mut spec.rest {
+            check_rest(rest, n)?;
+        }
+        check_material(&spec, n)?;
+        let lengths: Vec<f64> = (spec.length.iter().zip(&spec.subsegments))
+            .flat_map(|(&length, &count)| std::iter::repeat_n(length / count as f64, count))
+            .collect();
+        let arc_lengths = arc_lengths(&spec.length, &spec.subsegments);
+        Ok(Self { spec, lengths, arc_lengths })
+    }
+
+    /// The description it was made from.
+    #[must_use]
+    pub fn spec(&self) -> &BackboneSpec {
+        &self.spec
+    }
+
+    /// Number of subsegments n; there are n + 1 disks.
+    #[must_use]
+    pub fn subsegments(&self) -> usize {
+        self.lengths.len()
+    }
+
+    /// Rest length of each subsegment \[m\].
+    #[must_use]
+    pub fn lengths(&self) -> &[f64] {
+        &self.lengths
+    }
+
+    /// Arc length from the base to each disk, disk 0 included \[m\].
+    #[must_use]
+    pub fn arc_lengths(&self) -> &[f64] {
+        &self.arc_lengths
+    }
+
+    /// Rest length from base to tip \[m\].
+    #[must_use]
+    pub fn total_length(&self) -> f64 {
+        self.arc_lengths[self.subsegments()]
+    }
+
+    /// Rest rotation vector of a subsegment \[rad\].
+    #[must_use]
+    pub fn rest(&self, subsegment: usize) -> Vector3<f64> {
+        self.spec.rest.as_ref().map_or_else(Vector3::zeros, |rest| rest[subsegment])
+    }
+
+    /// Whether every subsegment is straight at rest.
+    #[must_use]
+    pub fn is_straight(&self) -> bool {
+        (self.spec.rest.iter().flatten()).all(|rest| *rest == Vector3::zeros())
+    }
+
+    /// Whether forces come out in newtons: Young's modulus (and so the diameter) is known.
+    #[must_use]
+    pub fn has_stiffness(&self) -> bool {
+        self.spec.youngs_modulus.is_some()
+    }
+
+    /// Bending stiffness EI of a subsegment \[N m^2\] (I = pi d^4 / 64). Without Young's modulus it is
+    /// in units of the base subsegment's.
+    #[must_use]
+    pub fn bending_stiffness(&self, subsegment: usize) -> f64 {
+        let diameter = |i: usize| {
+            (self.spec.diameter.as_ref()).map(|d| if d.len() == 1 { d[0] } else { d[i] })
+        };
+        match (self.spec.youngs_modulus, diameter(subsegment), diameter(0)) {
+            (Some(modulus), Some(d), _) => modulus * PI * d.powi(4) / 64.0,
+            (None, Some(d), Some(base)) => (d / base).powi(4),
+            _ => 1.0,
+        }
+    }
+
+    /// Strain energy of a rotation vector in a subsegment \[J, or 1/m in units of EI\]:
+    /// `[EI (dx^2 + dy^2) + GJ dz^2] / (2 l)` against rest, GJ = EI / (1 + nu) for a round rod
+    /// (Mahapatra & Ghosal, eqs. 1-3).
+    #[must_use]
+    pub fn strain_energy(&self, subsegment: usize, rotation: &Vector3<f64>) -> f64 {
+        let strain = rotation - self.rest(subsegment);
+        let torsion = strain.z * strain.z / (1.0 + self.spec.poisson_ratio);
+        let bending = strain.x * strain.x + strain.y * strain.y;
+        0.5 * self.bending_stiffness(subsegment) * (bending + torsion) / self.lengths[subsegment]
+    }
+}
+
+hash_by_bits!(Backbone, |backbone, bits| {
+    let spec = &backbone.spec;
+    bits.floats(&spec.length);
+    bits.counts(&spec.subsegments);
+    bits.float(spec.poisson_ratio);
+    bits.vectors(spec.rest.as_deref().unwrap_or_default());
+    bits.option(spec.youngs_modulus);
+    bits.floats(spec.diameter.as_deref().unwrap_or_default());
+    bits.option(spec.disk_radius);
+});
+
+/// Positions of the disks along the backbone; the ends of stretches carry no rounding of the steps.
+fn arc_lengths(stretches: &[f64], counts: &[usize]) -> Vec<f64> {
+    let mut start = 0.0;
+    let mut positions = vec![0.0];
+    for (&length, &count) in stretches.iter().zip(counts) {
+        for i in 1..=count {
+            positions.push(start + length * (i as f64 / count as f64));
+        }
+        start += length;
+    }
+    positions
+}
+
+fn check_rest(rest: &mut [Vector3<f64>], n: usize) -> Result<(), InvalidInput> {
+    if rest.len() != n {
+        let expected = format!("{n} rotation vectors, one per subsegment");
+        return Err(InvalidInput::new("rest", expected, rest.len()));
+    }
+    for vector in rest {
+        for component in vector.iter_mut() {
+            *component = finite("rest", "rad", *component)?;
+        }
+        if vector.norm() > PI {
+            let expected = "rotation vectors of at most pi rad per subsegment";
+            return Err(InvalidInput::new("rest", expected, vector.norm()));
+        }
+    }
+    Ok(())
+}
+
+fn check_material(spec: &BackboneSpec, n: usize) -> Result<(), InvalidInput> {
+    if let Some(modulus) = spec.youngs_modulus {
+        positive("youngs_modulus", "Pa", modulus)?;
+        if spec.diameter.is_none() {
+            let expected = "a diameter [m] beside Young's modulus (forces need both)";
+            return Err(InvalidInput::new("diameter", expected, "none"));
+        }
+    }
+    if let Some(diameter) = &spec.diameter {
+        if diameter.len() != 1 && diameter.len() != n {
+            let expected = format!("one diameter or {n}, one per subsegment");
+            return Err(InvalidInput::new("diameter", expected, diameter.len()));
+        }
+        for &value in diameter {
+            positive("diameter", "m", value)?;
+        }
+    }
+    if let Some(radius) = spec.disk_radius {
+        positive("disk_radius", "m", radius)?;
+    }
+    Ok(())
+}

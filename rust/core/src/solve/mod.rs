@@ -1,0 +1,3 @@
+//! Solvers: they see functions, gradients and block structure, never robots.
+
+pub mod sqp;

@@ -1,0 +1,396 @@
+//! Newton/SQP for small equality-constrained minima, all of it on the stack.
+//!
+//! `min f(x) subject to c(x) = 0` over a manifold with `N` local coordinates and `M < N`
+//! constraints, both known at compile time. Every iteration solves the quadratic model exactly in
+//! the null space of the constraint Jacobian (Nocedal & Wright, *Numerical Optimization*, 2nd ed.,
+//! algorithms 18.1 and 16.2) with least-squares multipliers (eq. 18.21) and second derivatives of
+//! the Lagrangian, and is globalised by an augmented-Lagrangian merit function: at the current
+//! multiplier estimate it has no Maratos effect, so the fast end phase is never damped.
+
+use nalgebra::{SMatrix, SVector};
+
+/// Value and first derivatives of a problem at one point.
+#[derive(Clone, Copy, Debug)]
+pub struct Linearization<const N: usize, const M: usize> {
+    /// Objective.
+    pub objective: f64,
+    /// Gradient of the objective in local coordinates.
+    pub gradient: SVector<f64, N>,
+    /// Constraint values, wanted zero.
+    pub constraints: SVector<f64, M>,
+    /// Gradients of the constraints as columns.
+    pub jacobian_transposed: SMatrix<f64, N, M>,
+}
+
+/// An equality-constrained problem on a manifold with `N` local coordinates.
+pub trait Problem<const N: usize, const M: usize> {
+    /// A point of the manifold with whatever is worth keeping between the calls below.
+    type Point: Copy;
+
+    /// Objective, constraints and their gradients.
+    fn linearize(&self, point: &Self::Point) -> Linearization<N, M>;
+
+    /// Second derivatives of `f + multipliers . c` along the (second-order) retraction.
+    fn hessian(&self, point: &Self::Point, multipliers: &SVector<f64, M>) -> SMatrix<f64, N, N>;
+
+    /// The point reached by a step in local coordinates.
+    fn retract(&self, point: &Self::Point, step: &SVector<f64, N>) -> Self::Point;
+
+    /// Whether the point lies on the branch whose minimum is wanted; steps that leave it are cut.
+    fn admissible(&self, point: &Self::Point) -> bool;
+
+    /// Size of a step in the units that the tolerance and the step bound are stated in.
+    fn step_size(&self, step: &SVector<f64, N>) -> f64;
+}
+
+/// How long and how precisely to iterate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The iteration ends with the first full Newton step below this; that step is still taken, so
+    /// the error left is about its square.
+    pub step_tolerance: f64,
+    /// No step is longer: trial points stay where the quadratic model means something.
+    pub step_bound: f64,
+    /// The constraint violation that counts as met (infinity norm, the problem's own scale).
+    pub constraint_tolerance: f64,
+    /// Newton steps at most.
+    pub max_iterations: usize,
+}
+
+/// Why the iteration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The Newton step fell below the tolerance with the constraints met.
+    Converged,
+    /// The constraint violation has a nonzero local minimum at the last point.
+    Infeasible,
+    /// Out of iterations, or no further decrease.
+    IterationLimit,
+    /// A value was not finite.
+    NumericalError,
+}
+
+/// The last point and how it was reached.
+#[derive(Clone, Copy, Debug)]
+pub struct Solution<P, const M: usize> {
+    /// The last point, solution or not.
+    pub point: P,
+    /// Multipliers of the constraints: `grad f + sum_j multipliers_j grad c_j = 0`.
+    pub multipliers: SVector<f64, M>,
+    /// Why the iteration ended.
+    pub ending: Ending,
+    /// Newton steps taken.
+    pub iterations: usize,
+    /// Constraint violation at the last point (infinity norm).
+    pub violation: f64,
+    /// Gradient of the Lagrangian in the null space at the last point (infinity norm).
+    pub stationarity: f64,
+}
+
+/// Shrinks of one line search: 2^-24 of a step is no step.
+const BACKTRACKS: usize = 24;
+
+/// Fraction of the predicted decrease that a step must deliver.
+const ARMIJO: f64 = 1e-4;
+
+/// Minimises `problem` from `start`.
+pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
+    problem: &P,
+    start: P::Point,
+    settings: &Settings,
+) -> Solution<P::Point, M> {
+    let mut point = start;
+    let mut at = problem.linearize(&point);
+    let mut penalty = 10.0;
+    let mut ending = Ending::IterationLimit;
+    let mut iterations = 0;
+    let mut frame = Frame::new(&at);
+    while iterations < settings.max_iterations {
+        let hessian = problem.hessian(&point, &frame.multipliers);
+        let Some(step) = frame.newton_step(&at, &hessian) else {
+            ending = Ending::NumericalError;
+            break;
+        };
+        iterations += 1;
+        let size = problem.step_size(&step.full);
+        let last = step.exact && size <= settings.step_tolerance;
+        let accepted = if last {
+            let trial = problem.retract(&point, &step.full);
+            Some((trial, problem.linearize(&trial)))
+        } else {
+            {
+                let limit = (settings.step_bound / size.max(f64::MIN_POSITIVE)).min(1.0);
+                search(problem, &point, &at, &step, limit, &mut penalty)
+            }
+        };
+        let Some((next, next_at)) = accepted else {
+            ending = stalled(&at, settings);
+            break;
+        };
+        point = next;
+        at = next_at;
+        frame = Frame::new(&at);
+        if last && at.constraints.amax() <= settings.constraint_tolerance {
+            ending = Ending::Converged;
+            break;
+        }
+    }
+    if ending == Ending::IterationLimit && !at.objective.is_finite() {
+        ending = Ending::NumericalError;
+    } else if ending == Ending::IterationLimit {
+        ending = stalled(&at, settings);
+    }
+    Solution {
+        point,
+        multipliers: frame.multipliers,
+        ending,
+        iterations,
+        violation: at.constraints.amax(),
+        stationarity: frame.stationarity(),
+    }
+}
+
+/// No decrease left: infeasible where the squared violation is stationary at a nonzero value.
+fn stalled<const N: usize, const M: usize>(
+    at: &Linearization<N, M>,
+    settings: &Settings,
+) -> Ending {
+    let violation = at.constraints.amax();
+    let descent = (at.jacobian_transposed * at.constraints).amax();
+    if violation > settings.constraint_tolerance.sqrt() && descent <= 1e-3 * violation {
+        Ending::Infeasible
+    } else {
+        Ending::IterationLimit
+    }
+}
+
+/// A step of the quadratic model.
+struct Step<const N: usize, const M: usize> {
+    full: SVector<f64, N>,
+    multipliers: SVector<f64, M>,
+    /// `step . H step` with the Hessian that was used.
+    curvature: f64,
+    /// The Hessian was used as it is: not shifted to make it convex.
+    exact: bool,
+}
+
+/// Backtracks along the step until the augmented Lagrangian falls enough.
+fn search<const N: usize, const M: usize, P: Problem<N, M>>(
+    problem: &P,
+    point: &P::Point,
+    at: &Linearization<N, M>,
+    step: &Step<N, M>,
+    limit: f64,
+    penalty: &mut f64,
+) -> Option<(P::Point, Linearization<N, M>)> {
+    let squared = at.constraints.norm_squared();
+    // Derivative of the merit along the step: -curvature - penalty |c|^2. The penalty makes it a
+    // descent direction even where the range-space part of the model has negative curvature.
+    if step.curvature < 0.0 && squared > 0.0 {
+        *penalty = penalty.max(-2.0 * step.curvature / squared);
+    }
+    let slope = -step.curvature - *penalty * squared;
+    let merit = |l: &Linearization<N, M>| {
+        l.objective
+            + step.multipliers.dot(&l.constraints)
+            + 0.5 * *penalty * l.constraints.norm_squared()
+    };
+    let before = merit(at);
+    // Below this the difference of two merits is rounding.
+    let noise = 1e-14 * before.abs() + 1e-300;
+    let mut factor = limit;
+    for _ in 0..BACKTRACKS {
+        let trial = problem.retract(point, &(step.full * factor));
+        if !problem.admissible(&trial) {
+            factor *= 0.5;
+            continue;
+        }
+        let trial_at = problem.linearize(&trial);
+        let after = merit(&trial_at);
+        if after <= before + ARMIJO * factor * slope.min(0.0) + noise {
+            return Some((trial, trial_at));
+        }
+        factor *= 0.5;
+    }
+    None
+}
+
+/// An orthonormal basis adapted to the constraint gradients: `Q^T J^T = [R; 0]` by Householder
+/// reflections, so the last `N - M` coordinates span the null space.
+struct Frame<const N: usize, const M: usize> {
+    reflectors: SMatrix<f64, N, M>,
+    triangle: SMatrix<f64, M, M>,
+    gradient: SVector<f64, N>,
+    multipliers: SVector<f64, M>,
+}
+
+impl<const N: usize, const M: usize> Frame<N, M> {
+    fn new(at: &Linearization<N, M>) -> Self {
+        let mut work = at.jacobian_transposed;
+        let mut gradient = at.gradient;
+        let mut reflectors = SMatrix::<f64, N, M>::zeros();
+        let mut triangle = SMatrix::<f64, M, M>::zeros();
+        for j in 0..M {
+            let mut v = SVector::<f64, N>::zeros();
+            for i in j..N {
+                v[i] = work[(i, j)];
+            }
+            let norm = v.norm();
+            let diagonal = if v[j] > 0.0 { -norm } else { norm };
+            v[j] -= diagonal;
+            let length = v.norm();
+            if length > 0.0 {
+                v *= std::f64::consts::SQRT_2 / length;
+            }
+            for k in 0..j {
+                triangle[(k, j)] = work[(k, j)];
+            }
+            triangle[(j, j)] = diagonal;
+            for k in (j + 1)..M {
+                let column = work.column(k) - v * v.dot(&work.column(k));
+                work.set_column(k, &column);
+            }
+            gradient -= v * v.dot(&gradient);
+            reflectors.set_column(j, &v);
+        }
+        let mut multipliers = SVector::<f64, M>::zeros();
+        for i in (0..M).rev() {
+            let mut value = -gradient[i];
+            for k in (i + 1)..M {
+                value -= triangle[(i, k)] * multipliers[k];
+            }
+            multipliers[i] = value / triangle[(i, i)];
+        }
+        Self { reflectors, triangle, gradient, multipliers }
+    }
+
+    /// Largest component of the projected gradient.
+    fn stationarity(&self) -> f64 {
+        (M..N).fold(0.0, |largest, i| self.gradient[i].abs().max(largest))
+    }
+
+    /// The minimiser of the quadratic model on the linearised constraints.
+    fn newton_step(
+        &self,
+        at: &Linearization<N, M>,
+        hessian: &SMatrix<f64, N, N>,
+    ) -> Option<Step<N, M>> {
+        // Into the adapted basis: H <- Q^T H Q.
+        let mut h = *hessian;
+        for j in 0..M {
+            let v = self.reflectors.column(j).into_owned();
+            let hv = h * v;
+            let k = 0.5 * v.dot(&hv);
+            let u = hv - v * k;
+            h -= u * v.transpose() + v * u.transpose();
+        }
+        let mut step = self.range_part(at);
+        let mut right = SVector::<f64, N>::zeros();
+        for i in M..N {
+            right[i] = -self.gradient[i];
+            for k in 0..M {
+                right[i] -= h[(i, k)] * step[k];
+            }
+        }
+        let exact = null_space_solve::<N, M>(&mut h, &right, &mut step)?;
+        let hs = h * step;
+        let curvature = step.dot(&hs);
+        let mut multipliers = SVector::<f64, M>::zeros();
+        for i in (0..M).rev() {
+            let mut value = -self.gradient[i] - hs[i];
+            for k in (i + 1)..M {
+                value -= self.triangle[(i, k)] * multipliers[k];
+            }
+            multipliers[i] = value / self.triangle[(i, i)];
+        }
+        for j in (0..M).rev() {
+            let v = self.reflectors.column(j);
+            step -= v * v.dot(&step);
+        }
+        step.iter().all(|x| x.is_finite()).then_some(Step {
+            full: step,
+            multipliers,
+            curvature,
+            exact,
+        })
+    }
+
+    /// Range-space part of a step in the adapted basis: `R^T y = -c`.
+    fn range_part(&self, at: &Linearization<N, M>) -> SVector<f64, N> {
+        let mut step = SVector::<f64, N>::zeros();
+        for i in 0..M {
+            let mut value = -at.constraints[i];
+            for k in 0..i {
+                value -= self.triangle[(k, i)] * step[k];
+            }
+            step[i] = value / self.triangle[(i, i)];
+        }
+        step
+    }
+}
+
+/// Solves the null-space block of `h` for the last `N - M` entries of `step`, shifting the block
+/// until it is positive definite; returns whether no shift was needed. `None` when nothing finite
+/// comes out.
+fn null_space_solve<const N: usize, const M: usize>(
+    h: &mut SMatrix<f64, N, N>,
+    right: &SVector<f64, N>,
+    step: &mut SVector<f64, N>,
+) -> Option<bool> {
+    let scale = (M..N).fold(f64::MIN_POSITIVE, |s, i| h[(i, i)].abs().max(s));
+    if !scale.is_finite() {
+        return None;
+    }
+    let mut shift = 0.0;
+    for _ in 0..60 {
+        if let Some(l) = cholesky::<N, M>(h, shift) {
+            for i in M..N {
+                h[(i, i)] += shift;
+            }
+            for i in M..N {
+                let mut value = right[i];
+                for k in M..i {
+                    value -= l[(i, k)] * step[k];
+                }
+                step[i] = value / l[(i, i)];
+            }
+            for i in (M..N).rev() {
+                let mut value = step[i];
+                for k in (i + 1)..N {
+                    value -= l[(k, i)] * step[k];
+                }
+                step[i] = value / l[(i, i)];
+            }
+            return Some(shift == 0.0);
+        }
+        shift = if shift == 0.0 { 1e-3 * scale } else { 4.0 * shift };
+    }
+    None
+}
+
+/// Lower Cholesky factor of the null-space block plus `shift` on its diagonal.
+fn cholesky<const N: usize, const M: usize>(
+    h: &SMatrix<f64, N, N>,
+    shift: f64,
+) -> Option<SMatrix<f64, N, N>> {
+    let mut l = SMatrix::<f64, N, N>::zeros();
+    for j in M..N {
+        let mut diagonal = h[(j, j)] + shift;
+        for k in M..j {
+            diagonal -= l[(j, k)] * l[(j, k)];
+        }
+        if diagonal <= 1e-14 * h[(j, j)].abs() || !diagonal.is_finite() {
+            return None;
+        }
+        let pivot = diagonal.sqrt();
+        l[(j, j)] = pivot;
+        for i in (j + 1)..N {
+            let mut value = h[(i, j)];
+            for k in M..j {
+                value -= l[(i, k)] * l[(j, k)];
+            }
+            l[(i, j)] = value / pivot;
+        }
+    }
+    Some(l)
+}

@@ -1,0 +1,232 @@
+//! Between Python values and the core's.
+
+use nalgebra::{Matrix4, Vector3};
+use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyTuple, PyType};
+
+use tdcr::lie::Pose;
+use tdcr::{InvalidInput, Status};
+
+/// A core error as `tdcr.errors.InvalidInput`.
+pub(crate) fn invalid(error: &InvalidInput) -> PyErr {
+    Python::attach(|py| match invalid_class(py) {
+        Ok(class) => PyErr::from_type(class, (error.to_string(), error.argument.clone())),
+        Err(import_error) => import_error,
+    })
+}
+
+fn invalid_class(py: Python<'_>) -> PyResult<Bound<'_, PyType>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    Ok(CLASS.import(py, "tdcr.errors", "InvalidInput")?.clone())
+}
+
+/// A status as `tdcr.Status`.
+pub(crate) fn status(py: Python<'_>, status: Status) -> PyResult<Bound<'_, PyAny>> {
+    static MEMBERS: PyOnceLock<[Py<PyAny>; Status::ALL.len()]> = PyOnceLock::new();
+    let members = MEMBERS.get_or_try_init(py, || {
+        let class = py.import("tdcr._status")?.getattr("Status")?;
+        let mut members = Vec::with_capacity(Status::ALL.len());
+        for status in Status::ALL {
+            members.push(class.call1((status.as_str(),))?.unbind());
+        }
+        members.try_into().map_err(|_| PyTypeError::new_err("Status has other members"))
+    })?;
+    Ok(members[status as usize].bind(py).clone())
+}
+
+/// A Python value that is built on first access.
+pub(crate) struct Lazy(PyOnceLock<Py<PyAny>>);
+
+impl Default for Lazy {
+    fn default() -> Self {
+        Self(PyOnceLock::new())
+    }
+}
+
+impl Lazy {
+    pub(crate) fn get(
+        &self,
+        py: Python<'_>,
+        build: impl FnOnce() -> PyResult<Py<PyAny>>,
+    ) -> PyResult<Py<PyAny>> {
+        Ok(self.0.get_or_try_init(py, build)?.clone_ref(py))
+    }
+}
+
+/// A number or a sequence of numbers.
+pub(crate) enum OneOrMany<T> {
+    /// A single one.
+    One(T),
+    /// One per stretch, disk or subsegment.
+    Many(Vec<T>),
+}
+
+impl<T: Clone> OneOrMany<T> {
+    pub(crate) fn into_vec(self) -> Vec<T> {
+        match self {
+            Self::One(value) => vec![value],
+            Self::Many(values) => values,
+        }
+    }
+}
+
+impl<'py, T> OneOrMany<T>
+where
+    T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
+{
+    /// A number if it is one, else a sequence; names the argument in a `TypeError`.
+    pub(crate) fn extract(argument: &str, kind: &str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let wrong = || {
+            let message = format!(
+                "{argument}: expected {kind} or a sequence of them, got {}",
+                type_name(value)
+            );
+            PyTypeError::new_err(message)
+        };
+        if let Ok(one) = value.extract() {
+            return Ok(Self::One(one));
+        }
+        if value.is_instance_of::<pyo3::types::PyString>() {
+            return Err(wrong());
+        }
+        let items = value.try_iter().map_err(|_| wrong())?;
+        let many: PyResult<Vec<T>> = items.map(|item| item?.extract()).collect();
+        many.map(Self::Many).map_err(|_| wrong())
+    }
+}
+
+/// The name of a value's type, for messages.
+pub(crate) fn type_name(value: &Bound<'_, PyAny>) -> String {
+    value.get_type().name().map_or_else(|_| "another type".to_owned(), |name| name.to_string())
+}
+
+/// A count: negative ones become 0, which the core refuses with its own message.
+pub(crate) fn count(value: i64) -> usize {
+    usize::try_from(value).unwrap_or(0)
+}
+
+/// An array of numbers of any shape as C-order float64.
+///
+/// Text and objects are a `TypeError`; what has no rectangular shape is `InvalidInput`.
+pub(crate) fn float_array<'py>(
+    argument: &str,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    if let Ok(array) = value.extract::<PyReadonlyArrayDyn<'py, f64>>()
+        && array.is_c_contiguous()
+    {
+        return Ok(array);
+    }
+    let py = value.py();
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("asarray", (value,)).map_err(|error| {
+        let expected = "a rectangular array of numbers";
+        let got = error.value(py).to_string();
+        invalid(&InvalidInput::new(argument, expected, got))
+    })?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !matches!(kind.as_str(), "f" | "i" | "u") {
+        let message = format!(
+            "{argument}: expected numbers, got {} of dtype {}",
+            type_name(value),
+            array.getattr("dtype")?
+        );
+        return Err(PyTypeError::new_err(message));
+    }
+    let float = numpy.call_method1("ascontiguousarray", (&array, "float64"))?;
+    // ascontiguousarray makes a 0-d array 1-d; shapes are checked on the original.
+    let shape = array.getattr("shape")?;
+    float.call_method1("reshape", (shape,))?.extract()
+}
+
+/// The values of a C-order array.
+pub(crate) fn values<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<&'a [f64]> {
+    Ok(array.as_slice()?)
+}
+
+/// A shape as Python prints it.
+pub(crate) fn shape_text(shape: &[usize]) -> String {
+    let sizes: Vec<String> = shape.iter().map(ToString::to_string).collect();
+    match sizes.as_slice() {
+        [one] => format!("({one},)"),
+        many => format!("({})", many.join(", ")),
+    }
+}
+
+/// Refuses an array of another shape than expected.
+pub(crate) fn wrong_shape(argument: &str, expected: &str, shape: &[usize]) -> PyErr {
+    let got = format!("shape {}", shape_text(shape));
+    invalid(&InvalidInput::new(argument, expected, got))
+}
+
+/// A 4x4 homogeneous matrix.
+pub(crate) fn matrix4(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Matrix4<f64>> {
+    let array = float_array(argument, value)?;
+    if array.shape() != [4, 4] {
+        return Err(wrong_shape(argument, "a homogeneous matrix of shape (4, 4)", array.shape()));
+    }
+    Ok(Matrix4::from_row_slice(values(&array)?))
+}
+
+/// Rows of three numbers.
+pub(crate) fn vectors(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Vector3<f64>>> {
+    let array = float_array(argument, value)?;
+    if array.shape().len() != 2 || array.shape()[1] != 3 {
+        return Err(wrong_shape(argument, "an array of shape (n, 3)", array.shape()));
+    }
+    Ok(values(&array)?.chunks_exact(3).map(Vector3::from_column_slice).collect())
+}
+
+/// A read-only numpy array of any shape from its values in C order.
+pub(crate) fn frozen<T: Element>(
+    py: Python<'_>,
+    values: Vec<T>,
+    shape: &[usize],
+) -> PyResult<Py<PyAny>> {
+    let array = PyArray::from_vec(py, values).reshape(shape.to_vec())?;
+    array.call_method1("setflags", (false,))?;
+    Ok(array.into_any().unbind())
+}
+
+/// Points as a read-only (m, 3) array.
+pub(crate) fn frozen_points(
+    py: Python<'_>,
+    points: impl Iterator<Item = Vector3<f64>>,
+) -> PyResult<Py<PyAny>> {
+    let flat: Vec<f64> = points.flat_map(|p| [p.x, p.y, p.z]).collect();
+    let rows = flat.len() / 3;
+    frozen(py, flat, &[rows, 3])
+}
+
+/// Frames as a read-only (m, 4, 4) array.
+pub(crate) fn frozen_frames(py: Python<'_>, frames: &[Pose]) -> PyResult<Py<PyAny>> {
+    let flat: Vec<f64> = frames.iter().flat_map(Pose::to_row_major).collect();
+    frozen(py, flat, &[frames.len(), 4, 4])
+}
+
+/// One number as itself, several as a tuple.
+pub(crate) fn one_or_tuple<'py, T>(py: Python<'py>, values: &[T]) -> PyResult<Bound<'py, PyAny>>
+where
+    T: Copy + IntoPyObject<'py>,
+{
+    if let [one] = values {
+        return one.into_bound_py_any(py);
+    }
+    Ok(PyTuple::new(py, values.iter().copied())?.into_any())
+}
+
+/// A list for a repr: whole when short, else its ends.
+pub(crate) fn list_text<T: std::fmt::Debug>(values: &[T]) -> String {
+    match values {
+        [one] => format!("{one:?}"),
+        many if many.len() <= 6 => format!("{many:?}"),
+        many => {
+            let last = &many[many.len() - 1];
+            format!("[{:?}, {:?}, ..., {last:?}]", many[0], many[1])
+        }
+    }
+}

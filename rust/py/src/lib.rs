@@ -1,0 +1,35 @@
+//! Python bindings of tdcr: convert, check, release the GIL, call the core, map errors.
+//!
+//! Nothing is computed here. The docstrings of the classes and functions are those of the Python
+//! package; units stand in square brackets there, as in its guide.
+// Python's docstrings carry [m] and numpydoc sections, which are no Rust links or headings.
+#![allow(rustdoc::broken_intra_doc_links, clippy::doc_markdown)]
+// pyo3 hands arguments over by value, and getters take self whether they look at it or not.
+#![allow(clippy::needless_pass_by_value, clippy::unused_self)]
+
+mod convert;
+mod forward;
+mod long_call;
+mod robot;
+mod settings;
+mod shape;
+
+/// The compiled core; use the package `tdcr`.
+#[pyo3::pymodule]
+mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::forward::{_forward_batch, forward};
+    #[pymodule_export]
+    use crate::robot::{_tendon, Backbone, Robot, Tendon};
+    #[pymodule_export]
+    use crate::settings::{_rust_defaults, LinkageSettings};
+    #[pymodule_export]
+    use crate::shape::{_shape, Shape};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

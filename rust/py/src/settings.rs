@@ -1,0 +1,83 @@
+//! Settings of the models.
+
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+use tdcr::linkage;
+
+use crate::convert::{count, invalid};
+
+/// How precisely and how long the linkage model solves each subsegment.
+///
+/// Parameters
+/// ----------
+/// step_tolerance : float, optional
+///     A subsegment is solved when a full Newton step falls below this [rad]; the error left is
+///     about its square. In (0, 1e-3].
+/// max_iterations : int, optional
+///     Newton steps per subsegment at most.
+///
+/// Raises
+/// ------
+/// InvalidInput
+///     A value out of range.
+#[pyclass(frozen, eq, module = "tdcr")]
+#[derive(Clone, PartialEq)]
+pub(crate) struct LinkageSettings(pub(crate) linkage::LinkageSettings);
+
+#[pymethods]
+impl LinkageSettings {
+    #[new]
+    #[pyo3(signature = (*, step_tolerance=1e-9, max_iterations=50))]
+    fn new(step_tolerance: f64, max_iterations: i64) -> PyResult<Self> {
+        let max_iterations = count(max_iterations);
+        let settings = linkage::LinkageSettings { step_tolerance, max_iterations };
+        settings.validate().map_err(|e| invalid(&e))?;
+        Ok(Self(settings))
+    }
+
+    /// Bound on the last Newton step [rad].
+    #[getter]
+    fn step_tolerance(&self) -> f64 {
+        self.0.step_tolerance
+    }
+
+    /// Newton steps per subsegment at most.
+    #[getter]
+    fn max_iterations(&self) -> usize {
+        self.0.max_iterations
+    }
+
+    fn __hash__(&self) -> u64 {
+        self.0.step_tolerance.to_bits().rotate_left(17) ^ self.0.max_iterations as u64
+    }
+
+    fn __repr__(&self) -> String {
+        let linkage::LinkageSettings { step_tolerance, max_iterations } = self.0;
+        format!(
+            "LinkageSettings(step_tolerance={step_tolerance:?}, max_iterations={max_iterations})"
+        )
+    }
+
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        let keywords = PyDict::new(py);
+        keywords.set_item("step_tolerance", self.step_tolerance())?;
+        keywords.set_item("max_iterations", self.max_iterations())?;
+        Ok((PyTuple::empty(py), keywords))
+    }
+}
+
+/// Defaults of the core's settings by class name, for the test that compares them with Python's.
+#[pyfunction]
+pub(crate) fn _rust_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let linkage = linkage::LinkageSettings::default();
+    let values = PyDict::new(py);
+    values.set_item("step_tolerance", linkage.step_tolerance)?;
+    values.set_item("max_iterations", linkage.max_iterations)?;
+    let defaults = PyDict::new(py);
+    defaults.set_item("LinkageSettings", values)?;
+    Ok(defaults)
+}

@@ -1,0 +1,315 @@
+//! `Shape`: the result of a forward solve.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use nalgebra::{Matrix3, Vector3};
+use numpy::PyUntypedArrayMethods;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList, PyTuple};
+
+use tdcr::Status;
+use tdcr::lie::Pose;
+use tdcr::model::{Report, State};
+
+use crate::convert::{Lazy, float_array, frozen, frozen_frames, frozen_points, status, values};
+use crate::robot::Robot;
+
+/// The shape of a robot, as a forward model found it. A solve that did not converge carries its
+/// last iterate, a status and a message. Arrays are in the world frame, read-only and built once,
+/// on first access.
+#[pyclass(frozen, eq, module = "tdcr")]
+pub(crate) struct Shape {
+    robot: Robot,
+    model: String,
+    displacements: Vec<f64>,
+    core: tdcr::Shape,
+    arrays: Arrays,
+}
+
+#[derive(Default)]
+struct Arrays {
+    frames: Lazy,
+    positions: Lazy,
+    tip: Lazy,
+    strains: Lazy,
+    tendon_points: Lazy,
+    tendon_lengths: Lazy,
+    tensions: Lazy,
+    displacements: Lazy,
+}
+
+impl Shape {
+    pub(crate) fn new(
+        robot: Robot,
+        model: &str,
+        displacements: Vec<f64>,
+        core: tdcr::Shape,
+    ) -> Self {
+        Self { robot, model: model.to_owned(), displacements, core, arrays: Arrays::default() }
+    }
+}
+
+fn same_bits(a: &[f64], b: &[f64]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
+}
+
+impl PartialEq for Shape {
+    fn eq(&self, other: &Self) -> bool {
+        let (a, b) = (&self.core, &other.core);
+        self.robot == other.robot
+            && self.model == other.model
+            && same_bits(&self.displacements, &other.displacements)
+            && a.state.frames == b.state.frames
+            && a.state.strains == b.state.strains
+            && same_bits(&a.state.tensions, &b.state.tensions)
+            && a.report.status == b.report.status
+    }
+}
+
+#[pymethods]
+impl Shape {
+    /// The robot that was solved.
+    #[getter]
+    fn robot(&self) -> Robot {
+        self.robot.clone()
+    }
+
+    /// Name of the model that solved it.
+    #[getter]
+    fn model(&self) -> &str {
+        &self.model
+    }
+
+    /// Tendon displacements, shape (K,) [m]: negative pulls, `inf` is free.
+    #[getter]
+    fn displacements(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let build = || frozen(py, self.displacements.clone(), &[self.displacements.len()]);
+        self.arrays.displacements.get(py, build)
+    }
+
+    /// Frame of every disk, shape (n + 1, 4, 4).
+    #[getter]
+    fn frames(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let build = || frozen_frames(py, &self.core.state.frames);
+        self.arrays.frames.get(py, build)
+    }
+
+    /// Centre of every disk, shape (n + 1, 3) [m].
+    #[getter]
+    fn positions(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let build = || frozen_points(py, self.core.state.frames.iter().map(|f| f.translation));
+        self.arrays.positions.get(py, build)
+    }
+
+    /// Frame of the tip disk, shape (4, 4).
+    #[getter]
+    fn tip(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let build = || {
+            let tip = self.core.state.frames.last().copied().unwrap_or_else(Pose::identity);
+            frozen(py, tip.to_row_major().to_vec(), &[4, 4])
+        };
+        self.arrays.tip.get(py, build)
+    }
+
+    /// Rotation vector of every element in the frame of its own base (bending about x and y,
+    /// torsion), shape (n, 3) [rad].
+    #[getter]
+    fn strains(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let build = || frozen_points(py, self.core.state.strains.iter().copied());
+        self.arrays.strains.get(py, build)
+    }
+
+    /// Places of every tendon's holes: list of K arrays of shape (end + 1, 3) [m].
+    #[getter]
+    fn tendon_points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let arrays = self.arrays.tendon_points.get(py, || {
+            let points = (self.robot.0.paths().iter())
+                .map(|path| frozen_points(py, path.points(&self.core.state.frames)));
+            let points = points.collect::<PyResult<Vec<_>>>()?;
+            Ok(PyTuple::new(py, points)?.into_any().unbind())
+        })?;
+        // A list of its own for every caller; the arrays are shared and read-only.
+        arrays.bind(py).cast::<PyTuple>()?.as_sequence().to_list()
+    }
+
+    /// Length of every tendon from the base to its end, shape (K,) [m].
+    #[getter]
+    fn tendon_lengths(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let lengths = &self.core.state.tendon_lengths;
+        let build = || frozen(py, lengths.clone(), &[lengths.len()]);
+        self.arrays.tendon_lengths.get(py, build)
+    }
+
+    /// Tension of every tendon, shape (K,) [N, or 1/m^2 when `units` is "EI"]. NaN in the linkage
+    /// model, which knows no forces.
+    #[getter]
+    fn tensions(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let tensions = &self.core.state.tensions;
+        let build = || frozen(py, tensions.clone(), &[tensions.len()]);
+        self.arrays.tensions.get(py, build)
+    }
+
+    /// Contacts with obstacles: list, empty in models without obstacles.
+    #[getter]
+    fn contacts<'py>(&self, py: Python<'py>) -> Bound<'py, PyList> {
+        PyList::empty(py)
+    }
+
+    /// Strain energy of the backbone [J, or 1/m when `units` is "EI"].
+    #[getter]
+    fn energy(&self) -> f64 {
+        self.core.state.energy
+    }
+
+    /// How the solve ended: tdcr.Status.
+    #[getter]
+    fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        status(py, self.core.report.status)
+    }
+
+    /// Whether the solve converged.
+    #[getter]
+    fn ok(&self) -> bool {
+        self.core.report.status == Status::Converged
+    }
+
+    /// What stood in the way, or an empty string.
+    #[getter]
+    fn message(&self) -> &str {
+        &self.core.message
+    }
+
+    /// Largest violation of the model's conditions at the answer, relative.
+    #[getter]
+    fn residual(&self) -> f64 {
+        self.core.report.residual
+    }
+
+    /// Newton steps taken, all subsegments together.
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.core.report.iterations
+    }
+
+    /// "SI" (J, N) when the backbone's Young's modulus and diameter are known; else "EI": energy in
+    /// 1/m and forces in 1/m^2, both to be multiplied by the bending stiffness EI.
+    #[getter]
+    fn units(&self) -> &'static str {
+        if self.robot.0.backbone().has_stiffness() { "SI" } else { "EI" }
+    }
+
+    /// The shape itself if the solve converged.
+    ///
+    /// Raises
+    /// ------
+    /// NotConverged
+    ///     With the shape as its `result`.
+    fn require<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, Self>> {
+        let shape = slf.get();
+        if shape.ok() {
+            return Ok(slf.clone());
+        }
+        let py = slf.py();
+        let message = format!("{}: {}", shape.core.report.status, shape.core.message);
+        let error = py.import("tdcr.errors")?.getattr("NotConverged")?.call1((message, slf))?;
+        Err(PyErr::from_value(error))
+    }
+
+    /// Draws the shape with matplotlib (an optional extra: `pip install tdcr[plot]`).
+    ///
+    /// Parameters
+    /// ----------
+    /// **options
+    ///     `ax`, an Axes to draw into, and others; see `tdcr._plot.plot_shape`.
+    ///
+    /// Returns
+    /// -------
+    /// matplotlib.axes.Axes
+    #[pyo3(signature = (**options))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("tdcr._plot")?.getattr("plot_shape")?.call((slf,), options)
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.robot.hash(&mut hasher);
+        for value in &self.displacements {
+            value.to_bits().hash(&mut hasher);
+        }
+        hasher.finish()
+    }
+
+    fn __repr__(&self) -> String {
+        let tip = self.core.state.frames.last().map(|f| f.translation).unwrap_or_default();
+        let status = self.core.report.status;
+        let message = &self.core.message;
+        let message = if message.is_empty() { String::new() } else { format!(" ({message})") };
+        format!(
+            "<Shape {status}{message}: tip ({:.6}, {:.6}, {:.6}) m, model {:?}>",
+            tip.x, tip.y, tip.z, self.model
+        )
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let rebuild = py.import("tdcr._core")?.getattr("_shape")?;
+        let state = (
+            self.robot.clone(),
+            self.model.clone(),
+            self.displacements(py)?,
+            self.frames(py)?,
+            self.strains(py)?,
+            self.tendon_lengths(py)?,
+            self.tensions(py)?,
+            self.energy(),
+            (self.core.report.status.as_str(), self.message(), self.residual(), self.iterations()),
+        );
+        Ok((rebuild, state.into_pyobject(py)?))
+    }
+}
+
+/// Rebuilds a pickled shape.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)] // The fields of a result, flat.
+pub(crate) fn _shape(
+    robot: &Bound<'_, Robot>,
+    model: &str,
+    displacements: &Bound<'_, PyAny>,
+    frames: &Bound<'_, PyAny>,
+    strains: &Bound<'_, PyAny>,
+    tendon_lengths: &Bound<'_, PyAny>,
+    tensions: &Bound<'_, PyAny>,
+    energy: f64,
+    outcome: (String, String, f64, usize),
+) -> PyResult<Shape> {
+    let list = |name: &str, value: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
+        Ok(values(&float_array(name, value)?)?.to_vec())
+    };
+    let frames = float_array("frames", frames)?;
+    if frames.shape().len() != 3 || frames.shape()[1..] != [4, 4] {
+        return Err(crate::convert::wrong_shape("frames", "shape (n + 1, 4, 4)", frames.shape()));
+    }
+    let frames = (values(&frames)?.chunks_exact(16))
+        .map(|m| Pose {
+            rotation: Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]),
+            translation: Vector3::new(m[3], m[7], m[11]),
+        })
+        .collect();
+    let state = State {
+        frames,
+        strains: crate::convert::vectors("strains", strains)?,
+        tendon_lengths: list("tendon_lengths", tendon_lengths)?,
+        tensions: list("tensions", tensions)?,
+        energy,
+    };
+    let (name, message, residual, iterations) = outcome;
+    let known = Status::ALL.into_iter().find(|status| status.as_str() == name);
+    let status = known.unwrap_or(Status::NumericalError);
+    let core = tdcr::Shape { state, report: Report { status, residual, iterations }, message };
+    Ok(Shape::new(robot.get().clone(), model, list("displacements", displacements)?, core))
+}
