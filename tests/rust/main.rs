@@ -1,4 +1,26 @@
 //! Integration tests of the core, one module per room.
+#![allow(
+    clippy::unwrap_used, // A test may stop where it fails.
+    clippy::panic,
+    clippy::cast_possible_truncation, // Random counts from random floats.
+    clippy::cast_sign_loss,
+    clippy::too_many_lines // A table of cases is one test.
+)]
 
+mod batch;
 mod lie;
 mod linkage_bars;
+mod linkage_chain;
+mod robot;
+
+/// Every file beside this one is a module of this target: a forgotten one would never run.
+#[test]
+fn every_file_is_declared() {
+    let here = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/rust");
+    let declared = include_str!("main.rs");
+    for entry in std::fs::read_dir(here).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        let stem = name.strip_suffix(".rs").unwrap();
+        assert!(stem == "main" || declared.contains(&format!("\nmod {stem};\n")), "{name}");
+    }
+}

@@ -6,7 +6,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::seven_bar::Hole;
+use super::seven_bar::{Hole, TINY_BEND};
 use crate::solve::sqp::{Linearization, Problem};
 
 /// Minimum of the squared coupler angle of a planar subsegment. Lengths in units of the rest length
@@ -38,8 +38,16 @@ impl FourBar {
         let (lower, upper) = (hole.lower.norm(), hole.upper.norm());
         let shortfall = hole.pull * (hole.rest_piece() - 0.5 * hole.pull);
         let alike = hole.lower == hole.upper;
-        let unit = if alike { 1.0 / (shortfall / upper).abs().clamp(1e-140, 1.0) } else { 1.0 };
-        Self { lower, upper, shortfall, bisection: if alike { 0.0 } else { 1.0 }, crank_unit: unit }
+        let bend = (shortfall / upper).abs();
+        let crank_unit = if alike { 1.0 / bend.clamp(TINY_BEND, 1.0) } else { 1.0 };
+        Self { lower, upper, shortfall, bisection: if alike { 0.0 } else { 1.0 }, crank_unit }
+    }
+
+    /// Whether the pull is so small that the start is the answer; see
+    /// [`SevenBar::is_tiny`](super::seven_bar::SevenBar::is_tiny).
+    #[must_use]
+    pub fn is_tiny(&self) -> bool {
+        self.crank_unit >= 1.0 / TINY_BEND
     }
 
     /// Bent as the linear theory of tendons has it.
@@ -53,7 +61,7 @@ impl FourBar {
 impl Problem<2, 1> for FourBar {
     type Point = Bend;
 
-    fn linearize(&self, b: &Bend) -> Linearization<2, 1> {
+    fn linearize(&self, b: &Bend, out: &mut Linearization<2, 1>) {
         let (sin, cos) = b.disk.sin_cos();
         let (link_sin, link_cos) = b.link.sin_cos();
         let (half_sin, half_cos) = (0.5 * b.disk).sin_cos();
@@ -68,7 +76,7 @@ impl Problem<2, 1> for FourBar {
         // d(R h')/d(disk) = -upper (sin, cos), dotted with link - lower hole.
         let turn = -self.upper * (sin * (link_sin - self.lower) + cos * link_cos);
         let (tilt, w) = (b.disk - b.link, self.bisection);
-        Linearization {
+        *out = Linearization {
             objective: b.disk * b.disk + w * (b.link * b.link + tilt * tilt),
             gradient: SVector::from([
                 2.0 * b.disk + 2.0 * w * tilt,
@@ -79,7 +87,7 @@ impl Problem<2, 1> for FourBar {
                 turn / self.upper,
                 across * self.crank_unit / self.upper,
             ]]),
-        }
+        };
     }
 
     fn hessian(&self, b: &Bend, multipliers: &SVector<f64, 1>) -> SMatrix<f64, 2, 2> {
@@ -97,8 +105,8 @@ impl Problem<2, 1> for FourBar {
         SMatrix::from([[2.0 + 2.0 * w + disk, cross], [cross, (4.0 * w + link) * unit * unit]])
     }
 
-    fn retract(&self, b: &Bend, step: &SVector<f64, 2>) -> Bend {
-        Bend { disk: b.disk + step[0], link: b.link + step[1] * self.crank_unit }
+    fn retract(&self, b: &Bend, step: &SVector<f64, 2>, factor: f64) -> Bend {
+        Bend { disk: b.disk + factor * step[0], link: b.link + factor * step[1] * self.crank_unit }
     }
 
     fn admissible(&self, b: &Bend) -> bool {

@@ -60,6 +60,9 @@ impl Coupler {
     }
 }
 
+/// Bends below this are solved by the linear theory \[rad\].
+pub(super) const TINY_BEND: f64 = 1e-100;
+
 /// Minimum of the squared coupler angles of two holes, of which the first `M` carry a tendon.
 #[derive(Clone, Copy, Debug)]
 pub struct SevenBar<const M: usize> {
@@ -170,15 +173,18 @@ impl<const M: usize> SevenBar<M> {
     pub fn new(holes: &[Hole; 2]) -> Self {
         let couplers = [Coupler::new(&holes[0]), Coupler::new(&holes[1])];
         let alike = couplers[..M].iter().all(|c| c.offset == Vector3::zeros());
-        let mut unit = 1.0;
-        if alike {
-            // The coupler angles do not see the crank at rest; its curvature grows with the square of
-            // the bend. In units of 1/bend the problem is well scaled down to the smallest pull.
-            let bend =
-                couplers[..M].iter().fold(0.0_f64, |b, c| b.max((c.shortfall * c.scale).abs()));
-            unit = 1.0 / bend.clamp(1e-140, 1.0);
-        }
-        Self { couplers, bisection: if alike { 0.0 } else { 1.0 }, crank_unit: unit }
+        let bend = couplers[..M].iter().fold(0.0, |b, c| (c.shortfall * c.scale).abs().max(b));
+        // The coupler angles do not see the crank at rest; its curvature grows with the square of the
+        // bend. In units of 1/bend the problem is well scaled down to the smallest pull.
+        let crank_unit = if alike { 1.0 / bend.clamp(TINY_BEND, 1.0) } else { 1.0 };
+        Self { couplers, bisection: if alike { 0.0 } else { 1.0 }, crank_unit }
+    }
+
+    /// Whether the pull is so small that its square underflows: the start, which is off by a share of
+    /// bend^2 / 24, then is the answer to the last digit.
+    #[must_use]
+    pub fn is_tiny(&self) -> bool {
+        self.crank_unit >= 1.0 / TINY_BEND
     }
 
     /// Bent as the linear theory of tendons has it, link at half the bend: on the right side of the
@@ -203,6 +209,41 @@ impl<const M: usize> SevenBar<M> {
     }
 }
 
+/// A pose with what the value, the gradient and the second derivatives share.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// The pose itself.
+    pub pose: Pose,
+    /// `(R - I) h'` of both holes.
+    moved: [Vector3<f64>; 2],
+    couplers: [SquaredAngle; 2],
+    /// Upper disk axis.
+    upper: Vector3<f64>,
+    /// Angles of the crank with the lower and the upper disk axis; only where they count.
+    axes: Option<[SquaredAngle; 2]>,
+}
+
+impl<const M: usize> SevenBar<M> {
+    /// Readies a pose for the solver.
+    #[must_use]
+    pub fn point(&self, pose: Pose) -> Point {
+        let moved = [0, 1].map(|j| {
+            let hole = &self.couplers[j].upper;
+            pose.turn.column(0) * hole.x + pose.turn.column(1) * hole.y
+        });
+        let couplers = [0, 1].map(|j| {
+            let scale = self.couplers[j].scale;
+            SquaredAngle::from_squared_distance(moved[j].norm_squared() * scale * scale)
+        });
+        let upper = Vector3::z() + pose.turn.column(2);
+        let axes = (self.bisection > 0.0).then(|| {
+            [Vector3::z(), upper]
+                .map(|n| SquaredAngle::from_squared_distance((pose.link - n).norm_squared()))
+        });
+        Point { pose, moved, couplers, upper, axes }
+    }
+}
+
 /// Quadratic form of the second derivative of `R(w) q . m` by the rotation vector `w`.
 #[inline]
 fn rotation_hessian(q: &Vector3<f64>, m: &Vector3<f64>) -> Matrix3<f64> {
@@ -211,97 +252,92 @@ fn rotation_hessian(q: &Vector3<f64>, m: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 impl<const M: usize> Problem<5, M> for SevenBar<M> {
-    type Point = Pose;
+    type Point = Point;
 
     #[inline]
-    fn linearize(&self, p: &Pose) -> Linearization<5, M> {
-        let mut out = Linearization::<5, M> {
-            objective: 0.0,
-            gradient: SVector::zeros(),
-            constraints: SVector::zeros(),
-            jacobian_transposed: SMatrix::zeros(),
-        };
+    fn linearize(&self, p: &Point, out: &mut Linearization<5, M>) {
+        let Pose { link, basis, .. } = &p.pose;
+        out.objective = 0.0;
         let mut by_rotation = Vector3::zeros();
         for (j, c) in self.couplers.iter().enumerate() {
-            let moved = p.turn * c.upper;
-            let turned = c.upper + moved;
-            let angle =
-                SquaredAngle::from_squared_distance(moved.norm_squared() * c.scale * c.scale);
+            let (moved, angle) = (p.moved[j], &p.couplers[j]);
             out.objective += angle.value;
             // moved x u, not turned x u: parallel vectors would leave only their rounding.
             by_rotation -= moved.cross(&c.direction) * (2.0 * angle.first * c.scale);
             if j < M {
                 let shift = moved + c.offset;
                 out.constraints[j] = c.scale
-                    * (p.link.dot(&shift) + moved.dot(&(moved * 0.5 + c.offset)) + c.shortfall);
-                let turn = turned.cross(&(p.link - c.lower)) * c.scale;
+                    * (link.dot(&shift) + moved.dot(&(moved * 0.5 + c.offset)) + c.shortfall);
+                let turn = (c.upper + moved).cross(&(link - c.lower)) * c.scale;
                 let unit = c.scale * self.crank_unit;
-                let column = [
-                    turn.x,
-                    turn.y,
-                    turn.z,
-                    p.basis[0].dot(&shift) * unit,
-                    p.basis[1].dot(&shift) * unit,
-                ];
-                out.jacobian_transposed.column_mut(j).copy_from(&SVector::<f64, 5>::from(column));
+                for i in 0..3 {
+                    out.jacobian_transposed[(i, j)] = turn[i];
+                }
+                for k in 0..2 {
+                    out.jacobian_transposed[(3 + k, j)] = basis[k].dot(&shift) * unit;
+                }
             }
         }
-        if self.bisection > 0.0 {
-            let (value, rotation, crank) = axes_gradient(p);
-            out.objective += self.bisection * value;
-            by_rotation += rotation * self.bisection;
-            for k in 0..2 {
-                out.gradient[3 + k] = self.bisection * self.crank_unit * crank.dot(&p.basis[k]);
-            }
+        let mut by_crank = [0.0; 2];
+        if let Some([lower, upper]) = &p.axes {
+            let weight = self.bisection;
+            out.objective += weight * (lower.value + upper.value);
+            by_rotation -= p.upper.cross(link) * (2.0 * weight * upper.first);
+            let pull = Vector3::z() * lower.first + p.upper * upper.first;
+            by_crank = basis.map(|b| -2.0 * weight * self.crank_unit * pull.dot(&b));
         }
-        out.gradient.fixed_rows_mut::<3>(0).copy_from(&by_rotation);
-        out
+        let [x, y, z] = by_rotation.into();
+        out.gradient = SVector::from([x, y, z, by_crank[0], by_crank[1]]);
     }
 
     #[inline]
-    fn hessian(&self, p: &Pose, multipliers: &SVector<f64, M>) -> SMatrix<f64, 5, 5> {
+    fn hessian(&self, p: &Point, multipliers: &SVector<f64, M>) -> SMatrix<f64, 5, 5> {
+        let Pose { link, basis, .. } = &p.pose;
         let mut rotation = Matrix3::zeros();
         let mut mixed = Vector3::zeros();
         let mut crank = 0.0;
         for (j, c) in self.couplers.iter().enumerate() {
-            let moved = p.turn * c.upper;
+            let (moved, angle) = (p.moved[j], &p.couplers[j]);
             let turned = c.upper + moved;
-            let q = turned * c.scale;
-            let angle =
-                SquaredAngle::from_squared_distance(moved.norm_squared() * c.scale * c.scale);
             let slope = moved.cross(&c.direction) * c.scale;
-            rotation += slope * slope.transpose() * (4.0 * angle.second)
-                - rotation_hessian(&q, &c.direction) * (2.0 * angle.first);
+            let mut against = c.direction * (-2.0 * angle.first * c.scale);
             if j < M {
                 let weight = multipliers[j] * c.scale;
-                rotation += rotation_hessian(&turned, &(p.link - c.lower)) * weight;
+                against += (link - c.lower) * weight;
                 mixed += turned * weight;
-                crank -= weight * p.link.dot(&(moved + c.offset));
+                crank -= weight * link.dot(&(moved + c.offset));
             }
+            rotation += slope * slope.transpose() * (4.0 * angle.second)
+                + rotation_hessian(&turned, &against);
         }
         let unit = self.crank_unit;
         let mut h = SMatrix::<f64, 5, 5>::zeros();
         for k in 0..2 {
-            let column = mixed.cross(&p.basis[k]) * unit;
+            let column = mixed.cross(&basis[k]) * unit;
             for i in 0..3 {
                 h[(i, 3 + k)] = column[i];
                 h[(3 + k, i)] = column[i];
             }
             h[(3 + k, 3 + k)] = crank * unit * unit;
         }
-        if self.bisection > 0.0 {
-            add_axes_hessian(p, self.bisection, unit, &mut rotation, &mut h);
+        if let Some(axes) = &p.axes {
+            self.add_axes_hessian(p, axes, &mut rotation, &mut h);
         }
-        h.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+        for k in 0..3 {
+            for i in 0..3 {
+                h[(i, k)] = rotation[(i, k)];
+            }
+        }
         h
     }
 
     #[inline]
-    fn retract(&self, p: &Pose, step: &SVector<f64, 5>) -> Pose {
-        let unit = self.crank_unit;
-        let link = p.link + p.basis[0] * (step[3] * unit) + p.basis[1] * (step[4] * unit);
-        let [w, x, y, z] = p.quaternion;
-        let (a, b, c) = (0.5 * step[0], 0.5 * step[1], 0.5 * step[2]);
+    fn retract(&self, p: &Point, step: &SVector<f64, 5>, factor: f64) -> Point {
+        let Pose { link, quaternion: [w, x, y, z], basis, .. } = p.pose;
+        let unit = factor * self.crank_unit;
+        let link = link + basis[0] * (step[3] * unit) + basis[1] * (step[4] * unit);
+        let half = 0.5 * factor;
+        let (a, b, c) = (half * step[0], half * step[1], half * step[2]);
         // (1, step/2) normalised agrees with Exp(step) to second order.
         let q = [
             w - a * x - b * y - c * z,
@@ -309,69 +345,55 @@ impl<const M: usize> Problem<5, M> for SevenBar<M> {
             y + b * w + c * x - a * z,
             z + c * w + a * y - b * x,
         ];
-        let length = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
-        Pose::from_parts(link.normalize(), q.map(|e| e / length))
+        let scale = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+        self.point(Pose::from_parts(link * (1.0 / link.norm()), q.map(|e| e * scale)))
     }
 
     #[inline]
-    fn admissible(&self, p: &Pose) -> bool {
+    fn admissible(&self, p: &Point) -> bool {
         // The mirror branch has its link on the far side of the bend: behind both disk axes.
-        p.link.z + p.link.dot(&(p.turn.column(2) + Vector3::z())) > 0.0
+        p.pose.link.z + p.pose.link.dot(&p.upper) > 0.0
     }
 
     #[inline]
     fn step_size(&self, step: &SVector<f64, 5>) -> f64 {
-        let turn = step.fixed_rows::<3>(0).amax();
-        turn.max(step.fixed_rows::<2>(3).amax() * self.crank_unit)
+        let turn = step[0].abs().max(step[1].abs()).max(step[2].abs());
+        turn.max(step[3].abs().max(step[4].abs()) * self.crank_unit)
     }
 }
 
-/// Squared angles of the crank with the lower and the upper disk axis: sum, gradient by the rotation
-/// and (unprojected) by the link direction.
-fn axes_gradient(p: &Pose) -> (f64, Vector3<f64>, Vector3<f64>) {
-    let lower = Vector3::z();
-    let upper = lower + p.turn.column(2);
-    let f0 = SquaredAngle::from_squared_distance((p.link - lower).norm_squared());
-    let f1 = SquaredAngle::from_squared_distance((p.link - upper).norm_squared());
-    (
-        f0.value + f1.value,
-        upper.cross(&p.link) * (-2.0 * f1.first),
-        lower * (-2.0 * f0.first) + upper * (-2.0 * f1.first),
-    )
-}
-
-/// Second derivatives of [`axes_gradient`]'s sum.
-fn add_axes_hessian(
-    p: &Pose,
-    weight: f64,
-    unit: f64,
-    rotation: &mut Matrix3<f64>,
-    h: &mut SMatrix<f64, 5, 5>,
-) {
-    let lower = Vector3::z();
-    let upper = lower + p.turn.column(2);
-    let f0 = SquaredAngle::from_squared_distance((p.link - lower).norm_squared());
-    let f1 = SquaredAngle::from_squared_distance((p.link - upper).norm_squared());
-    let slope = upper.cross(&p.link);
-    *rotation += (slope * slope.transpose() * (4.0 * f1.second)
-        - rotation_hessian(&upper, &p.link) * (2.0 * f1.first))
-        * weight;
-    let curvature = 2.0 * (f0.first * lower.dot(&p.link) + f1.first * upper.dot(&p.link));
-    for k in 0..2 {
-        let along = upper.dot(&p.basis[k]);
-        let column = (slope * (4.0 * f1.second * along)
-            - upper.cross(&p.basis[k]) * (2.0 * f1.first))
-            * (weight * unit);
-        for i in 0..3 {
-            h[(i, 3 + k)] += column[i];
-            h[(3 + k, i)] += column[i];
+impl<const M: usize> SevenBar<M> {
+    /// Second derivatives of the squared angles between crank and disk axes.
+    #[inline]
+    fn add_axes_hessian(
+        &self,
+        p: &Point,
+        [f0, f1]: &[SquaredAngle; 2],
+        rotation: &mut Matrix3<f64>,
+        h: &mut SMatrix<f64, 5, 5>,
+    ) {
+        let Pose { link, basis, .. } = &p.pose;
+        let (upper, weight, unit) = (&p.upper, self.bisection, self.crank_unit);
+        let slope = upper.cross(link);
+        *rotation += (slope * slope.transpose() * (4.0 * f1.second)
+            - rotation_hessian(upper, link) * (2.0 * f1.first))
+            * weight;
+        let curvature = 2.0 * (f0.first * link.z + f1.first * upper.dot(link));
+        let along = basis.map(|b| upper.dot(&b));
+        for k in 0..2 {
+            let column = (slope * (4.0 * f1.second * along[k])
+                - upper.cross(&basis[k]) * (2.0 * f1.first))
+                * (weight * unit);
+            for i in 0..3 {
+                h[(i, 3 + k)] += column[i];
+                h[(3 + k, i)] += column[i];
+            }
+            for l in 0..2 {
+                let other =
+                    4.0 * (f0.second * basis[k].z * basis[l].z + f1.second * along[k] * along[l]);
+                h[(3 + k, 3 + l)] += weight * unit * unit * other;
+            }
+            h[(3 + k, 3 + k)] += weight * unit * unit * curvature;
         }
-        for l in 0..2 {
-            let other = 4.0
-                * (f0.second * lower.dot(&p.basis[k]) * lower.dot(&p.basis[l])
-                    + f1.second * along * upper.dot(&p.basis[l]));
-            h[(3 + k, 3 + l)] += weight * unit * unit * other;
-        }
-        h[(3 + k, 3 + k)] += weight * unit * unit * curvature;
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::four_bar::FourBar;
-use super::seven_bar::{Hole, Pose, SevenBar};
+use super::seven_bar::{Hole, Point, Pose, SevenBar};
 use crate::solve::sqp::{self, Ending, Problem, Settings, Solution};
 
 /// What is asked of a subsegment; equal questions have equal answers.
@@ -83,11 +83,11 @@ impl Question {
             }
             Self::Spatial(holes) => {
                 let found = solve_seven_bar::<1>(holes, settings, None);
-                Answer::from_solution(&found.point, &found)
+                Answer::from_solution(&found.point.pose, &found)
             }
             Self::Pair(holes) => {
                 let found = solve_seven_bar::<2>(holes, settings, None);
-                Answer::from_solution(&found.point, &found)
+                Answer::from_solution(&found.point.pose, &found)
             }
         }
     }
@@ -129,6 +129,9 @@ impl Answer {
 #[must_use]
 pub fn solve_four_bar(hole: &Hole, settings: &Settings) -> Solution<super::four_bar::Bend, 1> {
     let problem = FourBar::new(hole);
+    if problem.is_tiny() {
+        return Solution::known(problem.start());
+    }
     let found = sqp::minimize(&problem, problem.start(), settings);
     in_steps(found, settings, |share, from| {
         let problem = FourBar::new(&Hole { pull: share * hole.pull, ..*hole });
@@ -143,18 +146,23 @@ pub fn solve_seven_bar<const M: usize>(
     holes: &[Hole; 2],
     settings: &Settings,
     start: Option<Pose>,
-) -> Solution<Pose, M> {
+) -> Solution<Point, M> {
     let problem = SevenBar::<M>::new(holes);
-    let mut found = sqp::minimize(&problem, start.unwrap_or_else(|| problem.start()), settings);
+    let own = problem.point(problem.start());
+    if problem.is_tiny() {
+        return Solution::known(own);
+    }
+    let mut found = sqp::minimize(&problem, start.map_or(own, |p| problem.point(p)), settings);
     if start.is_some() && found.ending != Ending::Converged {
         let spent = found.iterations;
-        found = sqp::minimize(&problem, problem.start(), settings);
+        found = sqp::minimize(&problem, own, settings);
         found.iterations += spent;
     }
     in_steps(found, settings, |share, from| {
         let pulled = holes.map(|hole| Hole { pull: share * hole.pull, ..hole });
         let problem = SevenBar::<M>::new(&pulled);
-        (problem, from.unwrap_or_else(|| problem.start()))
+        let pose = from.map_or_else(|| problem.start(), |point: Point| point.pose);
+        (problem, problem.point(pose))
     })
 }
 

@@ -4,7 +4,7 @@
 //! constraints, both known at compile time. Every iteration solves the quadratic model exactly in
 //! the null space of the constraint Jacobian (Nocedal & Wright, *Numerical Optimization*, 2nd ed.,
 //! algorithms 18.1 and 16.2) with least-squares multipliers (eq. 18.21) and second derivatives of
-//! the Lagrangian, and is globalised by an augmented-Lagrangian merit function: at the current
+//! the Lagrangian, and is globalised by an augmented-Lagrangian merit function: at a good
 //! multiplier estimate it has no Maratos effect, so the fast end phase is never damped.
 
 use nalgebra::{SMatrix, SVector};
@@ -27,14 +27,14 @@ pub trait Problem<const N: usize, const M: usize> {
     /// A point of the manifold with whatever is worth keeping between the calls below.
     type Point: Copy;
 
-    /// Objective, constraints and their gradients.
-    fn linearize(&self, point: &Self::Point) -> Linearization<N, M>;
+    /// Objective, constraints and their gradients, every entry written.
+    fn linearize(&self, point: &Self::Point, out: &mut Linearization<N, M>);
 
     /// Second derivatives of `f + multipliers . c` along the (second-order) retraction.
     fn hessian(&self, point: &Self::Point, multipliers: &SVector<f64, M>) -> SMatrix<f64, N, N>;
 
-    /// The point reached by a step in local coordinates.
-    fn retract(&self, point: &Self::Point, step: &SVector<f64, N>) -> Self::Point;
+    /// The point reached by `factor` times a step in local coordinates.
+    fn retract(&self, point: &Self::Point, step: &SVector<f64, N>, factor: f64) -> Self::Point;
 
     /// Whether the point lies on the branch whose minimum is wanted; steps that leave it are cut.
     fn admissible(&self, point: &Self::Point) -> bool;
@@ -87,11 +87,61 @@ pub struct Solution<P, const M: usize> {
     pub stationarity: f64,
 }
 
+impl<P, const M: usize> Solution<P, M> {
+    /// An answer that needed no iteration.
+    #[must_use]
+    pub fn known(point: P) -> Self {
+        Self {
+            point,
+            multipliers: SVector::zeros(),
+            ending: Ending::Converged,
+            iterations: 0,
+            violation: 0.0,
+            stationarity: 0.0,
+        }
+    }
+}
+
 /// Shrinks of one line search: 2^-24 of a step is no step.
 const BACKTRACKS: usize = 24;
 
 /// Fraction of the predicted decrease that a step must deliver.
 const ARMIJO: f64 = 1e-4;
+
+/// Weight of the squared constraints in the merit, raised where it has to be.
+const INITIAL_PENALTY: f64 = 10.0;
+
+/// A point and its derivatives; two of them take turns, so that nothing is copied.
+struct Slot<P, const N: usize, const M: usize> {
+    point: P,
+    at: Linearization<N, M>,
+}
+
+impl<P: Copy, const N: usize, const M: usize> Slot<P, N, M> {
+    fn new(point: P) -> Self {
+        let at = Linearization {
+            objective: 0.0,
+            gradient: SVector::zeros(),
+            constraints: SVector::zeros(),
+            jacobian_transposed: SMatrix::zeros(),
+        };
+        Self { point, at }
+    }
+
+    /// Moves here from `from` by a share of a step.
+    fn go<Q: Problem<N, M, Point = P>>(
+        &mut self,
+        problem: &Q,
+        from: &Self,
+        step: &SVector<f64, N>,
+        factor: f64,
+    ) -> bool {
+        self.point = problem.retract(&from.point, step, factor);
+        let admissible = problem.admissible(&self.point);
+        problem.linearize(&self.point, &mut self.at);
+        admissible
+    }
+}
 
 /// Minimises `problem` from `start`.
 pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
@@ -99,62 +149,57 @@ pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
     start: P::Point,
     settings: &Settings,
 ) -> Solution<P::Point, M> {
-    let mut point = start;
-    let mut at = problem.linearize(&point);
-    let mut penalty = 10.0;
-    let mut ending = Ending::IterationLimit;
+    let (mut one, mut other) = (Slot::new(start), Slot::new(start));
+    // References, so that taking turns moves no data.
+    let (mut here, mut there) = (&mut one, &mut other);
+    problem.linearize(&here.point, &mut here.at);
+    let mut penalty = INITIAL_PENALTY;
+    let mut ending = None;
     let mut iterations = 0;
-    let mut frame = Frame::new(&at);
-    while iterations < settings.max_iterations {
-        let hessian = problem.hessian(&point, &frame.multipliers);
-        let Some(step) = frame.newton_step(&at, &hessian) else {
-            ending = Ending::NumericalError;
+    let mut frame = Frame::new(&here.at);
+    while ending.is_none() && iterations < settings.max_iterations {
+        let hessian = problem.hessian(&here.point, &frame.multipliers);
+        let Some(step) = frame.newton_step(&here.at, hessian) else {
+            ending = Some(Ending::NumericalError);
             break;
         };
         iterations += 1;
         let size = problem.step_size(&step.full);
         let last = step.exact && size <= settings.step_tolerance;
-        let accepted = if last {
-            let trial = problem.retract(&point, &step.full);
-            Some((trial, problem.linearize(&trial)))
+        let moved = if last {
+            there.go(problem, here, &step.full, 1.0);
+            true
         } else {
-            {
-                let limit = (settings.step_bound / size.max(f64::MIN_POSITIVE)).min(1.0);
-                search(problem, &point, &at, &step, limit, &mut penalty)
-            }
+            let limit = (settings.step_bound / size.max(f64::MIN_POSITIVE)).min(1.0);
+            search(problem, here, there, &step, limit, &mut penalty)
         };
-        let Some((next, next_at)) = accepted else {
-            ending = stalled(&at, settings);
-            break;
-        };
-        point = next;
-        at = next_at;
-        frame = Frame::new(&at);
-        if last && at.constraints.amax() <= settings.constraint_tolerance {
-            ending = Ending::Converged;
+        if !moved {
             break;
         }
-    }
-    if ending == Ending::IterationLimit && !at.objective.is_finite() {
-        ending = Ending::NumericalError;
-    } else if ending == Ending::IterationLimit {
-        ending = stalled(&at, settings);
+        std::mem::swap(&mut here, &mut there);
+        frame = Frame::new(&here.at);
+        if last && here.at.constraints.amax() <= settings.constraint_tolerance {
+            ending = Some(Ending::Converged);
+        }
     }
     Solution {
-        point,
+        point: here.point,
         multipliers: frame.multipliers,
-        ending,
+        ending: ending.unwrap_or_else(|| stalled(&here.at, settings)),
         iterations,
-        violation: at.constraints.amax(),
+        violation: here.at.constraints.amax(),
         stationarity: frame.stationarity(),
     }
 }
 
-/// No decrease left: infeasible where the squared violation is stationary at a nonzero value.
+/// No decrease or no iteration left: infeasible where the squared violation is stationary at a nonzero value.
 fn stalled<const N: usize, const M: usize>(
     at: &Linearization<N, M>,
     settings: &Settings,
 ) -> Ending {
+    if !at.objective.is_finite() {
+        return Ending::NumericalError;
+    }
     let violation = at.constraints.amax();
     let descent = (at.jacobian_transposed * at.constraints).amax();
     if violation > settings.constraint_tolerance.sqrt() && descent <= 1e-3 * violation {
@@ -167,6 +212,8 @@ fn stalled<const N: usize, const M: usize>(
 /// A step of the quadratic model.
 struct Step<const N: usize, const M: usize> {
     full: SVector<f64, N>,
+    /// Multipliers of the quadratic model: those expected at the end of the step. With them the merit
+    /// takes the full step in the end phase; with the current ones it would halve it.
     multipliers: SVector<f64, M>,
     /// `step . H step` with the Hessian that was used.
     curvature: f64,
@@ -174,45 +221,40 @@ struct Step<const N: usize, const M: usize> {
     exact: bool,
 }
 
-/// Backtracks along the step until the augmented Lagrangian falls enough.
+/// Backtracks along the step until the augmented Lagrangian falls enough; the accepted point is in
+/// `there`.
 fn search<const N: usize, const M: usize, P: Problem<N, M>>(
     problem: &P,
-    point: &P::Point,
-    at: &Linearization<N, M>,
+    here: &Slot<P::Point, N, M>,
+    there: &mut Slot<P::Point, N, M>,
     step: &Step<N, M>,
     limit: f64,
     penalty: &mut f64,
-) -> Option<(P::Point, Linearization<N, M>)> {
-    let squared = at.constraints.norm_squared();
+) -> bool {
+    let squared = here.at.constraints.norm_squared();
     // Derivative of the merit along the step: -curvature - penalty |c|^2. The penalty makes it a
     // descent direction even where the range-space part of the model has negative curvature.
     if step.curvature < 0.0 && squared > 0.0 {
         *penalty = penalty.max(-2.0 * step.curvature / squared);
     }
-    let slope = -step.curvature - *penalty * squared;
+    let slope = (-step.curvature - *penalty * squared).min(0.0);
     let merit = |l: &Linearization<N, M>| {
         l.objective
             + step.multipliers.dot(&l.constraints)
             + 0.5 * *penalty * l.constraints.norm_squared()
     };
-    let before = merit(at);
+    let before = merit(&here.at);
     // Below this the difference of two merits is rounding.
     let noise = 1e-14 * before.abs() + 1e-300;
     let mut factor = limit;
     for _ in 0..BACKTRACKS {
-        let trial = problem.retract(point, &(step.full * factor));
-        if !problem.admissible(&trial) {
-            factor *= 0.5;
-            continue;
-        }
-        let trial_at = problem.linearize(&trial);
-        let after = merit(&trial_at);
-        if after <= before + ARMIJO * factor * slope.min(0.0) + noise {
-            return Some((trial, trial_at));
+        let admissible = there.go(problem, here, &step.full, factor);
+        if admissible && merit(&there.at) <= before + ARMIJO * factor * slope + noise {
+            return true;
         }
         factor *= 0.5;
     }
-    None
+    false
 }
 
 /// An orthonormal basis adapted to the constraint gradients: `Q^T J^T = [R; 0]` by Householder
@@ -273,16 +315,19 @@ impl<const N: usize, const M: usize> Frame<N, M> {
     fn newton_step(
         &self,
         at: &Linearization<N, M>,
-        hessian: &SMatrix<f64, N, N>,
+        mut h: SMatrix<f64, N, N>,
     ) -> Option<Step<N, M>> {
         // Into the adapted basis: H <- Q^T H Q.
-        let mut h = *hessian;
         for j in 0..M {
-            let v = self.reflectors.column(j).into_owned();
-            let hv = h * v;
-            let k = 0.5 * v.dot(&hv);
-            let u = hv - v * k;
-            h -= u * v.transpose() + v * u.transpose();
+            let v = self.reflectors.column(j);
+            let mut u = h * v;
+            u -= v * (0.5 * v.dot(&u));
+            for k in 0..N {
+                for i in k..N {
+                    h[(i, k)] -= u[i] * v[k] + v[i] * u[k];
+                    h[(k, i)] = h[(i, k)];
+                }
+            }
         }
         let mut step = self.range_part(at);
         let mut right = SVector::<f64, N>::zeros();

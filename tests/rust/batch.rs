@@ -1,0 +1,131 @@
+//! Batches: every row kept, in order, the same on any number of threads.
+
+use std::sync::atomic::Ordering;
+
+use tdcr::Status;
+use tdcr::batch::{Control, Fields, pool, solve_rows};
+use tdcr::linkage::{Linkage, LinkageSettings};
+use tdcr::model::Model;
+use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+
+const ALL: Fields = Fields {
+    tip: true,
+    frames: true,
+    positions: true,
+    strains: true,
+    tendon_points: true,
+    tendon_lengths: true,
+    tensions: true,
+    energy: true,
+};
+
+fn robot() -> Robot {
+    let backbone = Backbone::new(BackboneSpec::straight(0.2, 5)).unwrap();
+    let tendons = [0.0, 2.0].map(|azimuth| Tendon::straight(azimuth, 0.01).unwrap()).to_vec();
+    Robot::new(backbone, tendons, None, None, None).unwrap()
+}
+
+/// 1001 rows, most fine, every seventh out of reach.
+fn rows() -> Vec<f64> {
+    (0..1001)
+        .flat_map(|i| {
+            let pull = 1e-5 * f64::from(i);
+            [if i % 7 == 0 { -0.19 } else { -pull }, -0.5 * pull]
+        })
+        .collect()
+}
+
+#[test]
+fn rows_equal_single_solves_on_any_number_of_threads() {
+    let robot = robot();
+    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let rows = rows();
+    let solve = |threads| {
+        let control = Control::default();
+        let pool = pool(Some(threads)).unwrap();
+        let columns = solve_rows(&model, &rows, 1001, ALL, &pool, &control).unwrap().unwrap();
+        assert_eq!(control.done.load(Ordering::Relaxed), 1001);
+        columns
+    };
+    let (one, four) = (solve(1), solve(4));
+    assert_eq!(one.frames, four.frames);
+    assert_eq!(one.reports, four.reports);
+    assert_eq!(one.tendon_points, four.tendon_points);
+    for i in 0..1001 {
+        let shape = model.shape(&rows[2 * i..2 * i + 2]).unwrap();
+        assert_eq!(shape.report, one.reports[i]);
+        assert_eq!(shape.report.status == Status::Infeasible, i % 7 == 0);
+        let tip = shape.state.frames[5];
+        assert_eq!(one.tip[16 * i..16 * i + 16], tip.to_row_major());
+        assert_eq!(one.frames[16 * (6 * i + 5)..16 * (6 * i + 6)], tip.to_row_major());
+        assert_eq!(&one.positions[3 * (6 * i + 5)..3 * (6 * i + 6)], tip.translation.as_slice());
+        assert_eq!(&one.strains[15 * i + 12..15 * i + 15], shape.state.strains[4].as_slice());
+        assert_eq!(one.tendon_lengths[2 * i..2 * i + 2], shape.state.tendon_lengths);
+        assert_eq!(one.energy[i], shape.state.energy);
+        let last = shape.tendon_points(&robot, 1)[5];
+        assert_eq!(&one.tendon_points[1][3 * (6 * i + 5)..3 * (6 * i + 6)], last.as_slice());
+        assert!(one.tensions[2 * i].is_nan());
+    }
+}
+
+#[test]
+fn fields_that_were_not_wanted_are_empty() {
+    let robot = robot();
+    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let fields = Fields { energy: true, ..Fields::default() };
+    let pool = pool(None).unwrap();
+    let columns = solve_rows(&model, &rows(), 1001, fields, &pool, &Control::default());
+    let columns = columns.unwrap().unwrap();
+    assert!(columns.tip.is_empty() && columns.frames.is_empty() && columns.strains.is_empty());
+    assert_eq!(columns.energy.len(), 1001);
+}
+
+#[test]
+fn bad_rows_are_named_and_the_first_one_wins() {
+    let robot = robot();
+    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let mut bad = rows();
+    bad[2 * 900] = f64::NAN;
+    bad[2 * 77 + 1] = f64::NEG_INFINITY;
+    let pool = pool(Some(2)).unwrap();
+    let error = solve_rows(&model, &bad, 1001, ALL, &pool, &Control::default()).unwrap_err();
+    assert_eq!(error.argument, "displacements");
+    assert!(error.got.ends_with("in row 77") && error.got.contains("'t1'"), "{error}");
+    // Refused by the model, not by the check of the numbers.
+    let backbone = Backbone::new(BackboneSpec::straight(0.2, 5)).unwrap();
+    let twins = vec![Tendon::straight(0.0, 0.01).unwrap(); 2];
+    let robot = Robot::new(backbone, twins, None, None, None).unwrap();
+    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let mut rows = vec![0.0; 400];
+    rows[2 * 150] = -0.001;
+    rows[2 * 150 + 1] = -0.001;
+    rows[2 * 60] = -0.001;
+    rows[2 * 60 + 1] = -0.001;
+    let error = solve_rows(&model, &rows, 200, ALL, &pool, &Control::default()).unwrap_err();
+    assert!(error.got.ends_with("in row 60"), "{error}");
+}
+
+#[test]
+fn a_stopped_batch_returns_nothing() {
+    let robot = robot();
+    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let control = Control::default();
+    control.stop.store(true, Ordering::Relaxed);
+    let pool = pool(Some(2)).unwrap();
+    assert!(solve_rows(&model, &rows(), 1001, ALL, &pool, &control).unwrap().is_none());
+}
+
+#[test]
+fn empty_batches_and_robots_without_tendons_are_fine() {
+    let robot = robot();
+    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let pool = pool(Some(2)).unwrap();
+    let columns = solve_rows(&model, &[], 0, ALL, &pool, &Control::default()).unwrap().unwrap();
+    assert!(columns.tip.is_empty() && columns.reports.is_empty());
+    let backbone = Backbone::new(BackboneSpec::straight(0.2, 5)).unwrap();
+    let bare = Robot::new(backbone, vec![], None, None, None).unwrap();
+    let model = Linkage::new(&bare, LinkageSettings::default()).unwrap();
+    let columns = solve_rows(&model, &[], 3, ALL, &pool, &Control::default()).unwrap().unwrap();
+    assert_eq!(columns.tip.len(), 48);
+    assert!(pool.current_num_threads() == 2 && tdcr::batch::pool(Some(0)).is_err());
+}
