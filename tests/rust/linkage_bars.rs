@@ -54,7 +54,9 @@ fn check_derivatives<const N: usize, const M: usize, P: Problem<N, M>>(p: &P, x:
             unit[axis] = 1.0;
             step[axis] += size / p.step_size(&unit);
         }
-        let l = linearize(p, &p.retract(x, &step, 1.0));
+        let mut there = *x;
+        p.retract(x, &step, 1.0, &mut there);
+        let l = linearize(p, &there);
         (l.objective, l.constraints)
     };
     let size = |axis: usize| {

@@ -105,8 +105,11 @@ impl Problem<2, 1> for FourBar {
         SMatrix::from([[2.0 + 2.0 * w + disk, cross], [cross, (4.0 * w + link) * unit * unit]])
     }
 
-    fn retract(&self, b: &Bend, step: &SVector<f64, 2>, factor: f64) -> Bend {
-        Bend { disk: b.disk + factor * step[0], link: b.link + factor * step[1] * self.crank_unit }
+    fn retract(&self, b: &Bend, step: &SVector<f64, 2>, factor: f64, out: &mut Bend) {
+        *out = Bend {
+            disk: b.disk + factor * step[0],
+            link: b.link + factor * step[1] * self.crank_unit,
+        };
     }
 
     fn admissible(&self, b: &Bend) -> bool {

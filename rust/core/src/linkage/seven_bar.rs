@@ -226,6 +226,7 @@ pub struct Point {
 impl<const M: usize> SevenBar<M> {
     /// Readies a pose for the solver.
     #[must_use]
+    #[inline]
     pub fn point(&self, pose: Pose) -> Point {
         let moved = [0, 1].map(|j| {
             let hole = &self.couplers[j].upper;
@@ -332,7 +333,7 @@ impl<const M: usize> Problem<5, M> for SevenBar<M> {
     }
 
     #[inline]
-    fn retract(&self, p: &Point, step: &SVector<f64, 5>, factor: f64) -> Point {
+    fn retract(&self, p: &Point, step: &SVector<f64, 5>, factor: f64, out: &mut Point) {
         let Pose { link, quaternion: [w, x, y, z], basis, .. } = p.pose;
         let unit = factor * self.crank_unit;
         let link = link + basis[0] * (step[3] * unit) + basis[1] * (step[4] * unit);
@@ -346,7 +347,7 @@ impl<const M: usize> Problem<5, M> for SevenBar<M> {
             z + c * w + a * y - b * x,
         ];
         let scale = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
-        self.point(Pose::from_parts(link * (1.0 / link.norm()), q.map(|e| e * scale)))
+        *out = self.point(Pose::from_parts(link * (1.0 / link.norm()), q.map(|e| e * scale)));
     }
 
     #[inline]

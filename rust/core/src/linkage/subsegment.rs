@@ -133,6 +133,9 @@ pub fn solve_four_bar(hole: &Hole, settings: &Settings) -> Solution<super::four_
         return Solution::known(problem.start());
     }
     let found = sqp::minimize(&problem, problem.start(), settings);
+    if found.ending == Ending::Converged {
+        return found;
+    }
     in_steps(found, settings, |share, from| {
         let problem = FourBar::new(&Hole { pull: share * hole.pull, ..*hole });
         (problem, from.unwrap_or_else(|| problem.start()))
@@ -158,6 +161,9 @@ pub fn solve_seven_bar<const M: usize>(
         found = sqp::minimize(&problem, own, settings);
         found.iterations += spent;
     }
+    if found.ending == Ending::Converged {
+        return found;
+    }
     in_steps(found, settings, |share, from| {
         let pulled = holes.map(|hole| Hole { pull: share * hole.pull, ..hole });
         let problem = SevenBar::<M>::new(&pulled);
@@ -175,9 +181,6 @@ fn in_steps<const N: usize, const M: usize, P: Problem<N, M>>(
     settings: &Settings,
     at: impl Fn(f64, Option<P::Point>) -> (P, P::Point),
 ) -> Solution<P::Point, M> {
-    if found.ending == Ending::Converged {
-        return found;
-    }
     let mut iterations = found.iterations;
     let mut from = None;
     for step in 1..=STEPS {

@@ -33,8 +33,14 @@ pub trait Problem<const N: usize, const M: usize> {
     /// Second derivatives of `f + multipliers . c` along the (second-order) retraction.
     fn hessian(&self, point: &Self::Point, multipliers: &SVector<f64, M>) -> SMatrix<f64, N, N>;
 
-    /// The point reached by `factor` times a step in local coordinates.
-    fn retract(&self, point: &Self::Point, step: &SVector<f64, N>, factor: f64) -> Self::Point;
+    /// Puts the point reached by `factor` times a step in local coordinates into `out`.
+    fn retract(
+        &self,
+        point: &Self::Point,
+        step: &SVector<f64, N>,
+        factor: f64,
+        out: &mut Self::Point,
+    );
 
     /// Whether the point lies on the branch whose minimum is wanted; steps that leave it are cut.
     fn admissible(&self, point: &Self::Point) -> bool;
@@ -136,7 +142,7 @@ impl<P: Copy, const N: usize, const M: usize> Slot<P, N, M> {
         step: &SVector<f64, N>,
         factor: f64,
     ) -> bool {
-        self.point = problem.retract(&from.point, step, factor);
+        problem.retract(&from.point, step, factor, &mut self.point);
         let admissible = problem.admissible(&self.point);
         problem.linearize(&self.point, &mut self.at);
         admissible
@@ -156,7 +162,8 @@ pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
     let mut penalty = INITIAL_PENALTY;
     let mut ending = None;
     let mut iterations = 0;
-    let mut frame = Frame::new(&here.at);
+    let mut frame = Frame::new();
+    frame.adapt(&here.at);
     while ending.is_none() && iterations < settings.max_iterations {
         let hessian = problem.hessian(&here.point, &frame.multipliers);
         let Some(step) = frame.newton_step(&here.at, hessian) else {
@@ -177,7 +184,7 @@ pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
             break;
         }
         std::mem::swap(&mut here, &mut there);
-        frame = Frame::new(&here.at);
+        frame.adapt(&here.at);
         if last && here.at.constraints.amax() <= settings.constraint_tolerance {
             ending = Some(Ending::Converged);
         }
@@ -260,50 +267,76 @@ fn search<const N: usize, const M: usize, P: Problem<N, M>>(
 /// An orthonormal basis adapted to the constraint gradients: `Q^T J^T = [R; 0]` by Householder
 /// reflections, so the last `N - M` coordinates span the null space.
 struct Frame<const N: usize, const M: usize> {
+    /// Reflector j in column j from row j down; above it the column of R.
     reflectors: SMatrix<f64, N, M>,
-    triangle: SMatrix<f64, M, M>,
+    /// Reflection j is `I - scales_j v v^T`.
+    scales: SVector<f64, M>,
+    inverse_diagonal: SVector<f64, M>,
+    /// Gradient of the objective in the adapted basis.
     gradient: SVector<f64, N>,
     multipliers: SVector<f64, M>,
 }
 
 impl<const N: usize, const M: usize> Frame<N, M> {
-    fn new(at: &Linearization<N, M>) -> Self {
-        let mut work = at.jacobian_transposed;
-        let mut gradient = at.gradient;
-        let mut reflectors = SMatrix::<f64, N, M>::zeros();
-        let mut triangle = SMatrix::<f64, M, M>::zeros();
+    fn new() -> Self {
+        Self {
+            reflectors: SMatrix::zeros(),
+            scales: SVector::zeros(),
+            inverse_diagonal: SVector::zeros(),
+            gradient: SVector::zeros(),
+            multipliers: SVector::zeros(),
+        }
+    }
+
+    /// Adapts the basis to a point.
+    fn adapt(&mut self, at: &Linearization<N, M>) {
+        let frame = self;
+        frame.reflectors = at.jacobian_transposed;
+        frame.gradient = at.gradient;
+        // Column j keeps its reflector from row j down (unscaled: one root and one division each)
+        // and its part of the triangle above.
         for j in 0..M {
-            let mut v = SVector::<f64, N>::zeros();
+            let mut square = 0.0;
             for i in j..N {
-                v[i] = work[(i, j)];
+                square += frame.reflectors[(i, j)] * frame.reflectors[(i, j)];
             }
-            let norm = v.norm();
-            let diagonal = if v[j] > 0.0 { -norm } else { norm };
-            v[j] -= diagonal;
-            let length = v.norm();
-            if length > 0.0 {
-                v *= std::f64::consts::SQRT_2 / length;
-            }
-            for k in 0..j {
-                triangle[(k, j)] = work[(k, j)];
-            }
-            triangle[(j, j)] = diagonal;
+            let pivot = frame.reflectors[(j, j)];
+            let diagonal = -square.sqrt().copysign(pivot);
+            frame.reflectors[(j, j)] = pivot - diagonal;
+            frame.scales[j] = 1.0 / (square - pivot * diagonal).max(f64::MIN_POSITIVE);
+            frame.inverse_diagonal[j] = 1.0 / diagonal;
             for k in (j + 1)..M {
-                let column = work.column(k) - v * v.dot(&work.column(k));
-                work.set_column(k, &column);
+                let mut share = 0.0;
+                for i in j..N {
+                    share += frame.reflectors[(i, j)] * frame.reflectors[(i, k)];
+                }
+                share *= frame.scales[j];
+                for i in j..N {
+                    frame.reflectors[(i, k)] -= share * frame.reflectors[(i, j)];
+                }
             }
-            gradient -= v * v.dot(&gradient);
-            reflectors.set_column(j, &v);
+            frame.gradient = frame.reflect(j, frame.gradient);
         }
-        let mut multipliers = SVector::<f64, M>::zeros();
         for i in (0..M).rev() {
-            let mut value = -gradient[i];
+            let mut value = -frame.gradient[i];
             for k in (i + 1)..M {
-                value -= triangle[(i, k)] * multipliers[k];
+                value -= frame.reflectors[(i, k)] * frame.multipliers[k];
             }
-            multipliers[i] = value / triangle[(i, i)];
+            frame.multipliers[i] = value * frame.inverse_diagonal[i];
         }
-        Self { reflectors, triangle, gradient, multipliers }
+    }
+
+    /// The reflection of column j applied to a vector.
+    fn reflect(&self, j: usize, mut vector: SVector<f64, N>) -> SVector<f64, N> {
+        let mut share = 0.0;
+        for i in j..N {
+            share += self.reflectors[(i, j)] * vector[i];
+        }
+        share *= self.scales[j];
+        for i in j..N {
+            vector[i] -= share * self.reflectors[(i, j)];
+        }
+        vector
     }
 
     /// Largest component of the projected gradient.
@@ -317,15 +350,31 @@ impl<const N: usize, const M: usize> Frame<N, M> {
         at: &Linearization<N, M>,
         mut h: SMatrix<f64, N, N>,
     ) -> Option<Step<N, M>> {
-        // Into the adapted basis: H <- Q^T H Q.
+        // Into the adapted basis: H <- Q^T H Q, one symmetric rank-two update per reflection.
         for j in 0..M {
-            let v = self.reflectors.column(j);
-            let mut u = h * v;
-            u -= v * (0.5 * v.dot(&u));
+            let mut u = SVector::<f64, N>::zeros();
+            for k in j..N {
+                for i in 0..N {
+                    u[i] += h[(i, k)] * self.reflectors[(k, j)];
+                }
+            }
+            u *= self.scales[j];
+            let mut inner = 0.0;
+            for i in j..N {
+                inner += u[i] * self.reflectors[(i, j)];
+            }
+            inner *= 0.5 * self.scales[j];
+            for i in j..N {
+                u[i] -= inner * self.reflectors[(i, j)];
+            }
+            for k in j..N {
+                for i in 0..N {
+                    h[(i, k)] -= u[i] * self.reflectors[(k, j)];
+                }
+            }
             for k in 0..N {
-                for i in k..N {
-                    h[(i, k)] -= u[i] * v[k] + v[i] * u[k];
-                    h[(k, i)] = h[(i, k)];
+                for i in j..N {
+                    h[(i, k)] -= self.reflectors[(i, j)] * u[k];
                 }
             }
         }
@@ -344,13 +393,12 @@ impl<const N: usize, const M: usize> Frame<N, M> {
         for i in (0..M).rev() {
             let mut value = -self.gradient[i] - hs[i];
             for k in (i + 1)..M {
-                value -= self.triangle[(i, k)] * multipliers[k];
+                value -= self.reflectors[(i, k)] * multipliers[k];
             }
-            multipliers[i] = value / self.triangle[(i, i)];
+            multipliers[i] = value * self.inverse_diagonal[i];
         }
         for j in (0..M).rev() {
-            let v = self.reflectors.column(j);
-            step -= v * v.dot(&step);
+            step = self.reflect(j, step);
         }
         step.iter().all(|x| x.is_finite()).then_some(Step {
             full: step,
@@ -366,9 +414,9 @@ impl<const N: usize, const M: usize> Frame<N, M> {
         for i in 0..M {
             let mut value = -at.constraints[i];
             for k in 0..i {
-                value -= self.triangle[(k, i)] * step[k];
+                value -= self.reflectors[(k, i)] * step[k];
             }
-            step[i] = value / self.triangle[(i, i)];
+            step[i] = value * self.inverse_diagonal[i];
         }
         step
     }
@@ -397,14 +445,14 @@ fn null_space_solve<const N: usize, const M: usize>(
                 for k in M..i {
                     value -= l[(i, k)] * step[k];
                 }
-                step[i] = value / l[(i, i)];
+                step[i] = value * l[(i, i)];
             }
             for i in (M..N).rev() {
                 let mut value = step[i];
                 for k in (i + 1)..N {
                     value -= l[(k, i)] * step[k];
                 }
-                step[i] = value / l[(i, i)];
+                step[i] = value * l[(i, i)];
             }
             return Some(shift == 0.0);
         }
@@ -413,7 +461,8 @@ fn null_space_solve<const N: usize, const M: usize>(
     None
 }
 
-/// Lower Cholesky factor of the null-space block plus `shift` on its diagonal.
+/// Lower Cholesky factor of the null-space block plus `shift` on its diagonal, with the inverses of
+/// its pivots.
 fn cholesky<const N: usize, const M: usize>(
     h: &SMatrix<f64, N, N>,
     shift: f64,
@@ -427,14 +476,14 @@ fn cholesky<const N: usize, const M: usize>(
         if diagonal <= 1e-14 * h[(j, j)].abs() || !diagonal.is_finite() {
             return None;
         }
-        let pivot = diagonal.sqrt();
-        l[(j, j)] = pivot;
+        let inverse = 1.0 / diagonal.sqrt();
+        l[(j, j)] = inverse;
         for i in (j + 1)..N {
             let mut value = h[(i, j)];
             for k in M..j {
                 value -= l[(i, k)] * l[(j, k)];
             }
-            l[(i, j)] = value / pivot;
+            l[(i, j)] = value * inverse;
         }
     }
     Some(l)

@@ -1,0 +1,93 @@
+# make demo   builds, installs into .venv, solves the bundled robots, writes pictures to demo/
+# make test   everything that CI runs
+# make bench  criterion benches and side-by-side runs against other tools
+# make figures remakes the papers' figures into examples/figures/
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := $(shell find rust python Cargo.toml Cargo.lock pyproject.toml -type f -not -name '*.so' -not -path '*/__pycache__/*')
+
+# Pictures are written, never shown.
+export MPLBACKEND := Agg
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help demo test bench figures tools rust-checks rust-tests package python-checks python-tests runs clean
+
+help:
+	@sed -n 's/^# \(make .*\)/\1/p' Makefile
+
+demo: $(VENV)/installed
+	$(BIN)/tdcr demo --output demo
+
+test: tools rust-checks rust-tests package python-checks python-tests runs
+	@echo "all checks passed"
+
+# Says what is missing before anything starts.
+tools:
+	@command -v cargo >/dev/null || { echo "tdcr needs a Rust toolchain (cargo and rustc 1.89 or later) on the PATH: see https://rustup.rs" >&2; exit 1; }
+	@command -v rustc >/dev/null || { echo "tdcr needs rustc 1.89 or later on the PATH: see https://rustup.rs" >&2; exit 1; }
+	@command -v $(PYTHON) >/dev/null || { echo "tdcr needs Python 3.11 or later; name it with make PYTHON=/path/to/python3" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "tdcr needs Python 3.11 or later, $(PYTHON) is $$($(PYTHON) -V); name another with make PYTHON=..." >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "tdcr needs Python's venv module (on Debian: apt install python3-venv)" >&2; exit 1; }
+
+$(VENV)/created: | tools
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --upgrade pip
+	@touch $@
+
+$(VENV)/installed: $(VENV)/created $(SOURCES) | tools
+	$(BIN)/pip install --quiet --force-reinstall --no-deps .
+	$(BIN)/pip install --quiet '.[plot]'
+	@touch $@
+
+$(VENV)/developed: $(VENV)/created pyproject.toml
+	$(BIN)/pip install --quiet 'maturin>=1.14,<2' --group test --group peers
+	@touch $@
+
+rust-checks: tools
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
+
+rust-tests: tools
+	cargo test --locked
+	cargo bench --locked -- --test
+
+# The wheel that the Python tests use, and a wheel from the sdist, which must hold all it needs.
+package: $(VENV)/developed
+	rm -rf dist
+	$(BIN)/maturin build --release --locked --sdist --out dist
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist/from-sdist dist/tdcr-*.tar.gz
+	ls dist/*-abi3-*.whl dist/from-sdist/*-abi3-*.whl
+	wheel=$$(ls $(CURDIR)/dist/*.whl); \
+	$(BIN)/pip install --quiet --force-reinstall --no-deps "$$wheel"; \
+	$(BIN)/pip install --quiet "tdcr[plot] @ file://$$wheel"
+	@touch $(VENV)/installed
+
+python-checks: package
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	cd / && $(CURDIR)/$(BIN)/python -m mypy.stubtest tdcr._core
+
+python-tests: package
+	$(BIN)/pytest
+
+# What a user runs: the demo, the examples, the side-by-side comparison (once, in small), from the
+# installed wheel.
+runs: package
+	$(BIN)/tdcr demo --output target/runs/demo
+	for script in examples/*.py; do $(BIN)/python $$script --output target/runs/figures || exit 1; done
+	$(BIN)/python benches/peers/linkage.py --quick
+
+figures: $(VENV)/installed
+	for script in examples/*.py; do $(BIN)/python $$script --output examples/figures || exit 1; done
+
+bench: $(VENV)/installed $(VENV)/developed
+	cargo bench
+	$(BIN)/python benches/python_calls.py
+	$(BIN)/python benches/peers/linkage.py
+
+clean:
+	rm -rf $(VENV) dist demo target
