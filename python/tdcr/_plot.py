@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -226,7 +227,9 @@ class _Scene:
             points = points[np.isfinite(points).all(axis=1)] * self.scale
             dashed = state.endswith(("free", "slack"))
             colour = _COLOURS[k % len(_COLOURS)]
-            found.append(_Tendon(points, colour, dashed, f"{name} ({state})"))
+            # A label that starts with an underscore would be left out of the legend.
+            label = f" {name}" if name.startswith("_") else name
+            found.append(_Tendon(points, colour, dashed, f"{label} ({state})"))
         return found
 
     def _by(self, displacement: float) -> str:
@@ -299,7 +302,7 @@ class _Solid:
         self.ax.add_collection3d(
             Poly3DCollection(
                 [rim],
-                facecolor=(colour, 0.55 if base else 0.07),
+                facecolor=(colour, 0.55 if base else 0.04),
                 edgecolor=(colour, 0.9 if base else 0.75),
                 linewidth=1.6 if base else 0.8,
             )
@@ -330,7 +333,7 @@ class _Solid:
             pane.set_pane_color((1.0, 1.0, 1.0, 0.0))
             pane.line.set_color("#9AA0A8")
         ax.tick_params(labelsize=8)
-        ax.set_box_aspect(span, zoom=0.92)
+        ax.set_box_aspect(span, zoom=1.02)
         # Look at the bending plane from the side, a little from above.
         ax.view_init(elev=18.0, azim=self.plane.azimuth - 62.0)
 
@@ -368,23 +371,19 @@ def _draw(canvas: _Flat | _Solid, scene: _Scene, disks: bool, tendons: bool) -> 
 
 
 def _label(ax: Any, scene: _Scene, title: str | None, legend: bool) -> None:
-    import textwrap
-
     shape = scene.shape
     if title is None:
         name = f"{shape.robot.name}\n" if shape.robot.name else ""
         title = f"{name}{shape.model} model, {shape.status}"
-    if title:
-        ax.set_title(title, fontsize=10, color="black" if shape.ok else _FAILED)
     if not shape.ok:
         text = f"NOT A SOLUTION ({shape.status}): {shape.message}"
-        place = {"transform": ax.transAxes, "fontsize": 8, "color": _FAILED, "zorder": 10.0}
-        box = {"facecolor": "white", "edgecolor": _FAILED, "alpha": 0.9, "linewidth": 0.8}
-        draw = ax.text2D if ax.name == "3d" else ax.text
-        draw(0.02, 0.98, textwrap.fill(text, 60), va="top", bbox=box, **place)
+        title = f"{title}\n{textwrap.fill(text, 80)}".lstrip("\n")
+    if title:
+        # Names and messages are text, not formulas: a "$" in them is a "$".
+        ax.set_title(title, fontsize=10, color="black" if shape.ok else _FAILED, parse_math=False)
     if legend and shape.robot.tendons:
         count = len(shape.robot.tendons)
-        ax.legend(
+        entries = ax.legend(
             fontsize=8,
             frameon=False,
             loc="upper center",
@@ -393,3 +392,5 @@ def _label(ax: Any, scene: _Scene, title: str | None, legend: bool) -> None:
             title="tendons",
             title_fontsize=8,
         )
+        for text in entries.get_texts():
+            text.set_parse_math(False)

@@ -87,8 +87,8 @@ def _in_world(normal: Array, axis: Array, azimuth: float, holds: bool) -> Plane:
         across, up, up_name = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), "y"
     else:
         across, up, up_name = np.cross(normal, axis), axis, "along the base axis"
-        return Plane(-across, up, -np.cross(across, up), "across the base axis", up_name, azimuth,
-                     holds)  # fmt: skip
+        name = "across the base axis"
+        return Plane(across, up, np.cross(across, up), name, up_name, azimuth, holds)
     across = across / np.linalg.norm(across)
     heading = math.degrees(math.atan2(across[1], across[0]))
     # Left to right is towards +x, or +y in the y-z plane.
@@ -99,7 +99,8 @@ def _in_world(normal: Array, axis: Array, azimuth: float, holds: bool) -> Plane:
     elif abs(heading - 90.0) < 1e-4:
         name = "y"
     else:
-        name = f"horizontal, along azimuth {heading:.4g}\N{DEGREE SIGN}"
+        degrees = f"{heading:.4g}".replace("-", "\N{MINUS SIGN}")
+        name = f"horizontal, along azimuth {degrees}\N{DEGREE SIGN}"
     return Plane(across, up, np.cross(across, up), name, up_name, azimuth, holds)
 
 

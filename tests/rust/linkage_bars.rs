@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SMatrix, SVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tdcr::linkage::four_bar::{Bend, FourBar};
-use tdcr::linkage::seven_bar::{Hole, Pose, SevenBar};
-use tdcr::linkage::{LinkageSettings, solve_four_bar, solve_seven_bar};
+use tdcr::linkage::seven_bar::{Hole, SevenBar};
+use tdcr::linkage::{LinkageSettings, Pose, solve_four_bar, solve_seven_bar};
 use tdcr::solve::sqp::{Ending, Linearization, Problem, Settings};
 
 fn settings() -> Settings {

@@ -7,12 +7,14 @@
 // pyo3 hands arguments over by value, and getters take self whether they look at it or not.
 #![allow(clippy::needless_pass_by_value, clippy::unused_self)]
 
+mod backbone;
 mod convert;
 mod forward;
 mod long_call;
 mod robot;
 mod settings;
 mod shape;
+mod tendon;
 
 /// The compiled core; use the package `tdcr`.
 #[pyo3::pymodule]
@@ -20,13 +22,17 @@ mod _core {
     use pyo3::prelude::*;
 
     #[pymodule_export]
+    use crate::backbone::Backbone;
+    #[pymodule_export]
     use crate::forward::{_forward_batch, forward};
     #[pymodule_export]
-    use crate::robot::{_tendon, Backbone, Robot, Tendon};
+    use crate::robot::Robot;
     #[pymodule_export]
     use crate::settings::{_rust_defaults, LinkageSettings};
     #[pymodule_export]
     use crate::shape::{_shape, Shape};
+    #[pymodule_export]
+    use crate::tendon::{_tendon, Tendon};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

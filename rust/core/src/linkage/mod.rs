@@ -10,10 +10,12 @@ mod chain;
 mod drive;
 pub mod four_bar;
 mod message;
+mod pose;
 pub mod seven_bar;
 mod subsegment;
 
 pub use chain::{Linkage, Workspace};
+pub use pose::Pose;
 pub use subsegment::{solve_four_bar, solve_seven_bar};
 
 use crate::error::InvalidInput;

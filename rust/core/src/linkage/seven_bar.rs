@@ -10,6 +10,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::angle::SquaredAngle;
+use super::pose::Pose;
 use crate::solve::sqp::{Linearization, Problem};
 
 /// A tendon hole on the lower and the upper disk of a subsegment, and the pull on its piece.
@@ -71,95 +72,6 @@ pub struct SevenBar<const M: usize> {
     bisection: f64,
     /// Length of a unit of the crank's local coordinates.
     crank_unit: f64,
-}
-
-/// A pose of the upper disk: link direction and disk rotation, with what both derivatives need.
-#[derive(Clone, Copy, Debug)]
-pub struct Pose {
-    /// Unit vector from the lower to the upper disk centre, in the lower disk's frame.
-    pub link: Vector3<f64>,
-    /// Unit quaternion `[w, x, y, z]` of the upper disk in the lower disk's frame.
-    quaternion: [f64; 4],
-    /// `R - I`, kept apart so that a small turn keeps its digits.
-    turn: Matrix3<f64>,
-    /// Tangent basis of the sphere at `link`.
-    basis: [Vector3<f64>; 2],
-}
-
-impl Pose {
-    /// From a link direction and a rotation vector of the upper disk \[rad\].
-    #[must_use]
-    pub fn new(link: &Vector3<f64>, rotation: &Vector3<f64>) -> Self {
-        let angle = rotation.norm();
-        let (sin, cos) = (0.5 * angle).sin_cos();
-        let v = if angle > 1e-150 { rotation * (sin / angle) } else { rotation * 0.5 };
-        Self::from_parts(link.normalize(), [cos, v.x, v.y, v.z])
-    }
-
-    /// The straight subsegment.
-    #[must_use]
-    pub fn straight() -> Self {
-        Self::from_parts(Vector3::z(), [1.0, 0.0, 0.0, 0.0])
-    }
-
-    /// Bent by `angle` \[rad\] towards `azimuth` \[rad\] with the link at half the bend.
-    #[must_use]
-    pub fn bent(angle: f64, azimuth: f64) -> Self {
-        let (s, c) = azimuth.sin_cos();
-        let (half_sin, half_cos) = (0.5 * angle).sin_cos();
-        Self::from_parts(
-            Vector3::new(half_sin * c, half_sin * s, half_cos),
-            [half_cos, -half_sin * s, half_sin * c, 0.0],
-        )
-    }
-
-    fn from_parts(link: Vector3<f64>, quaternion: [f64; 4]) -> Self {
-        let [w, x, y, z] = quaternion;
-        let (xx, yy, zz) = (x * x, y * y, z * z);
-        let (xy, xz, yz) = (x * y, x * z, y * z);
-        let (wx, wy, wz) = (w * x, w * y, w * z);
-        let turn = Matrix3::new(
-            -2.0 * (yy + zz),
-            2.0 * (xy - wz),
-            2.0 * (xz + wy), //
-            2.0 * (xy + wz),
-            -2.0 * (xx + zz),
-            2.0 * (yz - wx), //
-            2.0 * (xz - wy),
-            2.0 * (yz + wx),
-            -2.0 * (xx + yy),
-        );
-        Self { link, quaternion, turn, basis: tangents(&link) }
-    }
-
-    /// Rotation matrix of the upper disk in the lower disk's frame.
-    #[must_use]
-    pub fn rotation(&self) -> Matrix3<f64> {
-        self.turn + Matrix3::identity()
-    }
-
-    /// Rotation vector of the upper disk in the lower disk's frame \[rad\].
-    #[must_use]
-    pub fn rotation_vector(&self) -> Vector3<f64> {
-        let [w, x, y, z] = self.quaternion;
-        let v = if w < 0.0 { -Vector3::new(x, y, z) } else { Vector3::new(x, y, z) };
-        let sine = v.norm();
-        if sine < 1e-150 {
-            return v * 2.0;
-        }
-        v * (2.0 * sine.atan2(w.abs()) / sine)
-    }
-}
-
-/// Two unit vectors that complete `n` to a right-handed frame (Duff et al., JCGT 6(1), 2017).
-fn tangents(n: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let sign = 1.0_f64.copysign(n.z);
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
-    [
-        Vector3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
-        Vector3::new(b, sign + n.y * n.y * a, -n.y),
-    ]
 }
 
 impl<const M: usize> SevenBar<M> {
@@ -226,7 +138,7 @@ pub struct Point {
 impl<const M: usize> SevenBar<M> {
     /// Readies a pose for the solver.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn point(&self, pose: Pose) -> Point {
         let moved = [0, 1].map(|j| {
             let hole = &self.couplers[j].upper;
@@ -255,7 +167,7 @@ fn rotation_hessian(q: &Vector3<f64>, m: &Vector3<f64>) -> Matrix3<f64> {
 impl<const M: usize> Problem<5, M> for SevenBar<M> {
     type Point = Point;
 
-    #[inline]
+    #[inline(always)]
     fn linearize(&self, p: &Point, out: &mut Linearization<5, M>) {
         let Pose { link, basis, .. } = &p.pose;
         out.objective = 0.0;

@@ -3,7 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::four_bar::FourBar;
-use super::seven_bar::{Hole, Point, Pose, SevenBar};
+use super::pose::Pose;
+use super::seven_bar::{Hole, Point, SevenBar};
 use crate::solve::sqp::{self, Ending, Problem, Settings, Solution};
 
 /// What is asked of a subsegment; equal questions have equal answers.

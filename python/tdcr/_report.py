@@ -1,0 +1,202 @@
+"""Shapes as JSON and as tables on a terminal, for the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from tdcr._core import Shape
+
+__all__ = ["as_json", "print_demo", "print_shape", "rotation_vector"]
+
+
+def as_json(shape: Shape) -> str:
+    """Write a shape as JSON text: SI units, "inf" for free tendons, null for what is not known."""
+    robot = shape.robot
+    data = {
+        "robot": robot.name,
+        "model": shape.model,
+        "status": str(shape.status),
+        "ok": shape.ok,
+        "message": shape.message,
+        "residual": shape.residual,
+        "iterations": shape.iterations,
+        "units": shape.units,
+        "tendon_names": list(robot.tendon_names),
+        "displacements": shape.displacements.tolist(),
+        "tendon_lengths": shape.tendon_lengths.tolist(),
+        "tensions": shape.tensions.tolist(),
+        "energy": shape.energy,
+        "tip": shape.tip.tolist(),
+        "positions": shape.positions.tolist(),
+        "frames": shape.frames.tolist(),
+        "strains": shape.strains.tolist(),
+        "tendon_points": [points.tolist() for points in shape.tendon_points],
+    }
+    return json.dumps(_standard(data), ensure_ascii=False, allow_nan=False)
+
+
+def _standard(value: Any) -> Any:
+    """Replace the numbers that JSON has not."""
+    match value:
+        case dict():
+            return {key: _standard(one) for key, one in value.items()}
+        case list():
+            return [_standard(one) for one in value]
+        case float() if math.isnan(value):
+            return None
+        case float() if math.isinf(value):
+            return "inf" if value > 0 else "-inf"
+    return value
+
+
+def print_shape(shape: Shape, unit: str) -> None:
+    """Print a shape as two tables: the outcome and the tendons.
+
+    Parameters
+    ----------
+    shape : Shape
+    unit : {"m", "mm"}
+        Unit of the lengths in the table.
+    """
+    console = _console()
+    scale = 1000.0 if unit == "mm" else 1.0
+    digits = 3 if unit == "mm" else 6
+    facts = _table(console, "", "")
+    facts.show_header = False
+    facts.columns[1].justify = "left"
+    for name, text in (
+        ("robot", shape.robot.name or "unnamed"),
+        ("model", shape.model),
+        ("status", str(shape.status)),
+        ("iterations", str(shape.iterations)),
+        (f"tip position x y z [{unit}]", _vector(shape.tip[:3, 3] * scale, digits)),
+        ("tip rotation vector x y z [deg]", _vector(_degrees(shape), 3)),
+    ):
+        facts.add_row(_text(name), _text(text))
+    known = bool(np.isfinite(shape.tensions).any())
+    force = "N" if shape.units == "SI" else "EI/m^2"
+    headers = [f"{name} [{unit}]" for name in ("displacement", "rest length", "length")]
+    tendons = _table(console, "tendon", *headers, *([f"tension [{force}]"] if known else []))
+    for k, name in enumerate(shape.robot.tendon_names):
+        by = shape.displacements[k]
+        lengths = (shape.robot.rest_lengths[k], shape.tendon_lengths[k])
+        row = ["free" if math.isinf(by) else f"{by * scale:+.{digits}f}"]
+        row += [f"{length * scale:.{digits}f}" for length in lengths]
+        row += [f"{shape.tensions[k]:.6g}"] if known else []
+        tendons.add_row(_text(name), *row)
+    console.print(facts)
+    console.print()
+    console.print(tendons)
+
+
+def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
+    """Print the table of the demonstration: position and rotation vector of the tip, tendons, effort.
+
+    Parameters
+    ----------
+    shapes : sequence of Shape
+    times : sequence of float
+        Time of each solve [s].
+    """
+    console = _console()
+    headers = ("tip\n[mm]", "rotation\n[deg]", "tendon length\n[mm]", "status", "steps", "time\n[us]")
+    table = _table(console, "robot", *headers)
+    for shape, time in zip(shapes, times, strict=True):
+        lengths = zip(shape.robot.tendon_names, shape.tendon_lengths * 1000.0, strict=True)
+        table.add_row(
+            _text(shape.robot.name or "unnamed"),
+            "\n".join(f"{x} {value:7.1f}" for x, value in zip("xyz", _millimetres(shape), strict=True)),
+            "\n".join(f"{value + 0.0:.1f}" for value in _degrees(shape).round(1)),
+            _text("\n".join(f"{name} {length:.1f}" for name, length in lengths)),
+            str(shape.status),
+            str(shape.iterations),
+            f"{time * 1e6:.1f}",
+        )
+        table.add_section()
+    console.print(table)
+
+
+def rotation_vector(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Axis times angle of a rotation matrix, by the quaternion's largest component.
+
+    Parameters
+    ----------
+    rotation : ndarray, shape (3, 3)
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        [rad], of length 0 to pi.
+    """
+    # q q^T from the entries of R (Shepperd's method): every row is a multiple of q.
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    products = np.array(
+        [
+            [1 + a + e + i, h - f, c - g, d - b],
+            [h - f, 1 + a - e - i, b + d, c + g],
+            [c - g, b + d, 1 - a + e - i, f + h],
+            [d - b, c + g, f + h, 1 - a - e + i],
+        ]
+    )
+    row = products[int(products.diagonal().argmax())]
+    w, v = row[0], row[1:] * (1.0 if row[0] >= 0 else -1.0)
+    sine = float(np.linalg.norm(v))
+    if sine == 0.0:
+        return np.zeros(3)
+    vector: NDArray[np.float64] = v * (2.0 * math.atan2(sine, abs(w)) / sine)
+    return vector
+
+
+def _millimetres(shape: Shape) -> NDArray[np.float64]:
+    """Position of the tip, rounded so that no -0.0 is left."""
+    rounded: NDArray[np.float64] = (shape.tip[:3, 3] * 1000.0).round(1) + 0.0
+    return rounded
+
+
+def _degrees(shape: Shape) -> NDArray[np.float64]:
+    tip = shape.tip[:3, :3]
+    return np.degrees(rotation_vector(tip)) if np.isfinite(tip).all() else np.full(3, np.nan)
+
+
+def _vector(values: NDArray[np.float64], digits: int) -> str:
+    # Adding 0.0 after rounding turns -0.0 into 0.0.
+    return "  ".join(f"{round(float(value), digits) + 0.0:.{digits}f}" for value in values)
+
+
+def _text(text: str) -> Any:
+    """Text of a user's: square brackets in it are no markup."""
+    from rich.text import Text
+
+    return Text(text)
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    # Into a pipe or a file: plain, and no line is broken to fit a terminal.
+    return Console(highlight=False) if sys.stdout.isatty() else Console(
+        highlight=False, width=400, no_color=True
+    )  # fmt: skip
+
+
+def _table(console: Console, *headers: str) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD if console.is_terminal else None, pad_edge=False)
+    table.padding = (0, 1, 0, 0) if console.is_terminal else (0, 2, 0, 0)
+    for index, header in enumerate(headers):
+        table.add_column(Text(header), justify="left" if index == 0 else "right", no_wrap=True)
+    return table
