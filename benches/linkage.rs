@@ -25,11 +25,8 @@ fn polar(radius: f64, azimuth: f64) -> Vector3<f64> {
 
 /// A subsegment of the classic trunk: holes at half its length, bent by about 0.15 rad.
 fn holes(taper: f64) -> [Hole; 2] {
-    [(0.0, 0.06), (1.6, 0.04)].map(|(azimuth, pull)| Hole {
-        lower: polar(0.5, azimuth),
-        upper: polar(0.5 * taper, azimuth),
-        pull,
-    })
+    [(0.0, 0.06), (1.6, 0.04)]
+        .map(|(azimuth, pull)| Hole::new(polar(0.5, azimuth), polar(0.5 * taper, azimuth), pull))
 }
 
 fn bars(c: &mut Criterion) {

@@ -161,7 +161,7 @@ def _forward(
     help="Write a picture of every robot there.",
 )
 def _demo(output: Path | None) -> int:
-    """Solve the bundled robots and print the pose of the tip (position, rotation vector) and more."""
+    """Solve the bundled robots and print where their tips are (position, rotation vector)."""
     from tdcr import _report
 
     shapes, times = [], []

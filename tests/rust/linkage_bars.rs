@@ -24,7 +24,7 @@ fn polar(radius: f64, azimuth: f64) -> Vector3<f64> {
 }
 
 fn alike(radius: f64, azimuth: f64, pull: f64) -> Hole {
-    Hole { lower: polar(radius, azimuth), upper: polar(radius, azimuth), pull }
+    Hole::new(polar(radius, azimuth), polar(radius, azimuth), pull)
 }
 
 fn linearize<const N: usize, const M: usize, P: Problem<N, M>>(
@@ -105,7 +105,7 @@ fn derivatives_agree_with_differences() {
             let upper =
                 polar(radius + change * u(-0.1, 0.3), azimuth + change * span * u(-1.0, 1.0));
             let lower = polar(radius, azimuth);
-            Hole { lower, upper: if change > 0.0 { upper } else { lower }, pull: u(0.1, 0.3) }
+            Hole::new(lower, if change > 0.0 { upper } else { lower }, u(0.1, 0.3))
         };
         let (pair, planar) = ([hole(0.4), hole(0.4)], hole(0.0));
         let mut v = || Vector3::new(u(-0.5, 0.5), u(-0.5, 0.5), u(-0.5, 0.5));
@@ -252,8 +252,8 @@ fn answers_satisfy_the_paper_s_nine_coordinate_conditions() {
 /// zeros where the subsegment is sheared and the disk does not turn at all.
 #[test]
 fn coupler_angles_alone_vanish_at_a_shear() {
-    let hole = Hole { lower: polar(0.5, 0.0), upper: polar(0.45, 0.0), pull: 0.02 };
-    let rest = hole.rest_piece();
+    let hole = Hole::new(polar(0.5, 0.0), polar(0.45, 0.0), 0.02);
+    let rest = hole.rest;
     let offset = hole.upper - hole.lower;
     // |d + offset| = rest - pull with the disk parallel: d.offset is known, and d is a unit vector.
     let along = ((rest - hole.pull).powi(2) - 1.0 - offset.norm_squared()) / (2.0 * offset.norm());
@@ -273,13 +273,13 @@ fn answers_are_continuous_where_the_objective_changes() {
         let half = u(0.01, 0.5);
         let (holes, _) = random_pair(&mut u, half);
         let same = solve_seven_bar::<2>(&holes, &settings(), None).point.pose;
-        let nearly = holes.map(|h| Hole { upper: h.upper * (1.0 + 1e-9), ..h });
+        let nearly = holes.map(|h| Hole::new(h.lower, h.upper * (1.0 + 1e-9), h.pull));
         let near = solve_seven_bar::<2>(&nearly, &settings(), None).point.pose;
         assert!((same.link - near.link).amax() < 1e-7);
         assert!((same.rotation() - near.rotation()).amax() < 1e-7);
         let planar = alike(holes[0].upper.norm(), 0.0, 1.9 * half * holes[0].upper.norm().min(0.5));
         let bend = solve_four_bar(&planar, &settings()).point;
-        let nearly = Hole { upper: planar.upper * (1.0 + 1e-9), ..planar };
+        let nearly = Hole::new(planar.lower, planar.upper * (1.0 + 1e-9), planar.pull);
         let near = solve_four_bar(&nearly, &settings()).point;
         assert!((bend.disk - near.disk).abs() < 1e-7 && (bend.link - near.link).abs() < 1e-7);
     }

@@ -107,7 +107,7 @@ impl<'r> Linkage<'r> {
         let hole = |k: usize| {
             let piece = self.pieces[k][subsegment];
             let share = -displacements[k] / self.robot.paths()[k].rest_length;
-            Hole { pull: share * piece.rest_piece(), ..piece }
+            Hole { pull: share * piece.rest, ..piece }
         };
         match drive {
             Drive::None => Question::Straight,
@@ -118,8 +118,7 @@ impl<'r> Linkage<'r> {
                     return Question::Planar(hole);
                 }
                 let quarter = |h: Vector3<f64>| Vector3::new(-h.y, h.x, 0.0);
-                let span =
-                    Hole { lower: quarter(hole.lower), upper: quarter(hole.upper), pull: 0.0 };
+                let span = Hole::new(quarter(hole.lower), quarter(hole.upper), 0.0);
                 Question::Spatial([hole, span])
             }
             Drive::Two(a, b) => Question::Pair([hole(a), hole(b)]),
@@ -204,5 +203,5 @@ fn answer(
 
 /// A tendon piece between two disks, in units of the subsegment's length.
 fn piece(holes: &[Vector3<f64>], length: f64) -> Hole {
-    Hole { lower: holes[0] / length, upper: holes[1] / length, pull: 0.0 }
+    Hole::new(holes[0] / length, holes[1] / length, 0.0)
 }

@@ -133,9 +133,9 @@ impl Choice<'_> {
         for i in run.first..run.last {
             let (a, b) = (&self.pieces[pulled][i], &self.pieces[k][i]);
             let (arm, other) = (a.lower + a.upper, b.lower + b.upper);
-            let bend = ratio * a.rest_piece() / arm.norm_squared().max(f64::MIN_POSITIVE);
+            let bend = ratio * a.rest / arm.norm_squared().max(f64::MIN_POSITIVE);
             stretch -= lengths[i] * bend * arm.dot(&other);
-            rest += lengths[i] * b.rest_piece();
+            rest += lengths[i] * b.rest;
         }
         stretch / rest - self.displacements[k] / path.rest_length
     }

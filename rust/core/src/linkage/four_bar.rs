@@ -36,8 +36,8 @@ impl FourBar {
     #[must_use]
     pub fn new(hole: &Hole) -> Self {
         let (lower, upper) = (hole.lower.norm(), hole.upper.norm());
-        let shortfall = hole.pull * (hole.rest_piece() - 0.5 * hole.pull);
-        let alike = hole.lower == hole.upper;
+        let shortfall = hole.pull * (hole.rest - 0.5 * hole.pull);
+        let alike = hole.is_alike();
         let bend = (shortfall / upper).abs();
         let crank_unit = if alike { 1.0 / bend.clamp(TINY_BEND, 1.0) } else { 1.0 };
         Self { lower, upper, shortfall, bisection: if alike { 0.0 } else { 1.0 }, crank_unit }

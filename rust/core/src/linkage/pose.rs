@@ -34,11 +34,17 @@ impl Pose {
     /// Bent by `angle` \[rad\] towards `azimuth` \[rad\] with the link at half the bend.
     #[must_use]
     pub fn bent(angle: f64, azimuth: f64) -> Self {
-        let (s, c) = azimuth.sin_cos();
+        let (sin, cos) = azimuth.sin_cos();
+        Self::bent_towards(angle, cos, sin)
+    }
+
+    /// The same, towards the unit vector `(cos, sin)`.
+    #[must_use]
+    pub(super) fn bent_towards(angle: f64, cos: f64, sin: f64) -> Self {
         let (half_sin, half_cos) = (0.5 * angle).sin_cos();
         Self::from_parts(
-            Vector3::new(half_sin * c, half_sin * s, half_cos),
-            [half_cos, -half_sin * s, half_sin * c, 0.0],
+            Vector3::new(half_sin * cos, half_sin * sin, half_cos),
+            [half_cos, -half_sin * sin, half_sin * cos, 0.0],
         )
     }
 

@@ -23,13 +23,22 @@ pub struct Hole {
     pub upper: Vector3<f64>,
     /// Shortening of the tendon piece from its rest length, positive when pulled.
     pub pull: f64,
+    /// Length of the tendon piece in a straight subsegment.
+    pub rest: f64,
 }
 
 impl Hole {
-    /// Rest length of the tendon piece in a straight subsegment.
+    /// From its places on both disks and the pull.
     #[must_use]
-    pub fn rest_piece(&self) -> f64 {
-        (1.0 + (self.upper - self.lower).norm_squared()).sqrt()
+    pub fn new(lower: Vector3<f64>, upper: Vector3<f64>, pull: f64) -> Self {
+        let rest = (1.0 + (upper - lower).norm_squared()).sqrt();
+        Self { lower, upper, pull, rest }
+    }
+
+    /// Whether it has the same place on both disks.
+    #[must_use]
+    pub fn is_alike(&self) -> bool {
+        self.lower == self.upper
     }
 }
 
@@ -54,7 +63,7 @@ impl Coupler {
             upper: hole.upper,
             offset: hole.upper - hole.lower,
             direction: hole.upper * scale,
-            shortfall: hole.pull * (hole.rest_piece() - 0.5 * hole.pull),
+            shortfall: hole.pull * (hole.rest - 0.5 * hole.pull),
             scale,
             pull: hole.pull,
         }
@@ -103,21 +112,33 @@ impl<const M: usize> SevenBar<M> {
     /// mirror, and not the answer.
     #[must_use]
     pub fn start(&self) -> Pose {
-        let (c, s) = self.linear_bend();
-        Pose::bent(c.hypot(s).min(2.0), s.atan2(c))
-    }
-
-    /// `(bend cos, bend sin)` to first order: `hole . (c, s) = pull` at the mean hole.
-    pub(super) fn linear_bend(&self) -> (f64, f64) {
-        let row = |c: &Coupler| (0.5 * (c.lower + c.upper), c.pull);
-        let (a, pull_a) = row(&self.couplers[0]);
-        if M == 1 {
-            let factor = pull_a / (a.x * a.x + a.y * a.y).max(f64::MIN_POSITIVE);
-            return (factor * a.x, factor * a.y);
+        let rows = self.couplers.each_ref().map(|c| (0.5 * (c.lower + c.upper), c.pull));
+        let (c, s) = linear_bend(&rows[..M]);
+        let bend = (c * c + s * s).sqrt();
+        // Too small for squares: the direction from the larger component.
+        if bend < 1e-140 {
+            return Pose::bent(c.hypot(s), s.atan2(c));
         }
-        let (b, pull_b) = row(&self.couplers[1]);
-        let determinant = a.x * b.y - a.y * b.x;
-        ((pull_a * b.y - pull_b * a.y) / determinant, (a.x * pull_b - b.x * pull_a) / determinant)
+        Pose::bent_towards(bend.min(2.0), c / bend, s / bend)
+    }
+}
+
+/// `(bend cos, bend sin)` to first order, from one or two holes and their pulls: `hole . (c, s) =
+/// pull`, the shortest answer for one.
+pub(super) fn linear_bend(rows: &[(Vector3<f64>, f64)]) -> (f64, f64) {
+    match rows {
+        [(a, pull)] => {
+            let factor = pull / (a.x * a.x + a.y * a.y).max(f64::MIN_POSITIVE);
+            (factor * a.x, factor * a.y)
+        }
+        [(a, pull_a), (b, pull_b), ..] => {
+            let determinant = a.x * b.y - a.y * b.x;
+            (
+                (pull_a * b.y - pull_b * a.y) / determinant,
+                (a.x * pull_b - b.x * pull_a) / determinant,
+            )
+        }
+        [] => (0.0, 0.0),
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::four_bar::FourBar;
 use super::pose::Pose;
-use super::seven_bar::{Hole, Point, SevenBar};
+use super::seven_bar::{Hole, Point, SevenBar, linear_bend};
 use crate::solve::sqp::{self, Ending, Problem, Settings, Solution};
 
 /// What is asked of a subsegment; equal questions have equal answers.
@@ -44,19 +44,17 @@ impl Question {
     /// The bound of the exact answer, where there is one (Ashwin & Ghosal, eq. 8, for one tendon;
     /// `docs/linkage.md` for two), and the length of the pieces.
     pub(super) fn obstacle(&self) -> Option<Obstacle> {
-        let too_short = |hole: &Hole| hole.pull >= hole.rest_piece();
-        let alike = |hole: &Hole| hole.lower == hole.upper;
         let (holes, bound) = match self {
             Self::Straight => return None,
             Self::Planar(hole) => {
-                let bound = alike(hole).then(|| 0.5 * hole.pull / hole.upper.norm());
+                let bound = hole.is_alike().then(|| 0.5 * hole.pull / hole.upper.norm());
                 (std::slice::from_ref(hole), bound)
             }
             Self::Spatial(holes) => (&holes[..1], None),
             Self::Pair(holes) => {
-                let bound = (alike(&holes[0]) && alike(&holes[1])).then(|| {
-                    let (c, s) = SevenBar::<2>::new(holes).linear_bend();
-                    0.5 * c.hypot(s)
+                let bound = holes.iter().all(Hole::is_alike).then(|| {
+                    let (c, s) = linear_bend(&holes.each_ref().map(|hole| (hole.upper, hole.pull)));
+                    0.5 * (c * c + s * s).sqrt()
                 });
                 (&holes[..], bound)
             }
@@ -67,7 +65,7 @@ impl Question {
         {
             return Some(Obstacle::Bend(half));
         }
-        holes.iter().position(too_short).map(Obstacle::Piece)
+        holes.iter().position(|hole| hole.pull >= hole.rest).map(Obstacle::Piece)
     }
 
     /// Solves the linkage.
