@@ -39,13 +39,15 @@ def bent(angle: float, towards: float) -> Array:
 
 
 def starts(pulls: Array) -> Array:
-    """The linear theory's bend for every row of pulls: the common start."""
+    """Bend every row of pulls by the linear theory: the common start."""
     c, s = pulls[:, 0] / RADIUS, pulls[:, 1] / RADIUS
-    return np.array([bent(np.hypot(*cs), np.arctan2(cs[1], cs[0])) for cs in zip(c, s, strict=True)])
+    return np.array(
+        [bent(np.hypot(*cs), np.arctan2(cs[1], cs[0])) for cs in zip(c, s, strict=True)]
+    )
 
 
 def problem() -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Unknowns, pulls, objective and constraints as the paper prints them, in units of the length."""
+    """State the paper's problem: unknowns, pulls, objective, constraints, over the length."""
     x, pulls = ca.SX.sym("x", 9), ca.SX.sym("pulls", 2)
     x0, tips = x[:3], (x[3:6], x[6:])
     holes = HOLES / LENGTH
@@ -114,7 +116,9 @@ def ours(pulls: Array, repeats: int) -> tuple[Array, float, float]:
     """Points, seconds per solve in a batch on one thread, seconds per single Python call."""
     tendons = [tdcr.Tendon(0.0, RADIUS), tdcr.Tendon(np.pi / 2, RADIUS)]
     robot = tdcr.Robot(tdcr.Backbone(LENGTH, 1), tendons)
-    batch = tdcr.forward_batch(robot, -pulls, model="linkage", fields=["positions", "tendon_points"])
+    batch = tdcr.forward_batch(
+        robot, -pulls, model="linkage", fields=["positions", "tendon_points"]
+    )
     assert batch.ok.all()
     points = [batch.positions[:, 1], *(holes[:, 1] for holes in batch.tendon_points)]
     many = np.tile(-pulls, (max(1, 20_000 // len(pulls)), 1))
@@ -136,8 +140,9 @@ def check(name: str, pulls: Array, answers: Array, points: Array, error: Array) 
     """
     x, p, f, g = problem()
     evaluate = ca.Function("evaluate", [x, p], [f, g])
-    for row, answer, point in zip(*(a[error >= AGREE] / LENGTH for a in (pulls, answers, points)),
-                                  strict=True):
+    for row, answer, point in zip(
+        *(a[error >= AGREE] / LENGTH for a in (pulls, answers, points)), strict=True
+    ):
         (theirs, violation), (best, _) = evaluate(answer, row), evaluate(point, row)
         infeasible = float(ca.norm_inf(violation)) > AGREE
         mirrored = answer[2] < 0

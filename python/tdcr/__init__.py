@@ -1,8 +1,8 @@
 """Tendon-driven continuum robots: from how far each tendon is pulled to the shape, and back.
 
 SI units everywhere (m, rad, N, Pa). The base frame has z along the backbone towards the tip and x
-towards azimuth 0; azimuths count counter-clockwise about +z. Displacements are changes of a tendon's
-length inside the robot: negative pulls.
+towards azimuth 0; azimuths count counter-clockwise about +z. Displacements are changes of a
+tendon's length inside the robot: negative pulls.
 
 >>> import tdcr
 >>> robot = tdcr.Robot(tdcr.Backbone(0.2, 20), [tdcr.Tendon(0.0, 0.01)])
@@ -10,7 +10,7 @@ length inside the robot: negative pulls.
 >>> shape.status
 <Status.converged: 'converged'>
 >>> shape.positions[-1].round(4).tolist()
-[0.0919, 0.0, 0.1683]
+[0.092, 0.0, 0.1683]
 """
 
 from __future__ import annotations

@@ -35,8 +35,8 @@ class ShapeBatch(Sequence["Shape"]):
     """Shapes of one robot under many displacements, in the order of the rows.
 
     The fields asked for are attributes, and so are `status` (B,), `ok` (B,), `residual` (B,) and
-    `iterations` (B,); reading a field that was not asked for raises. `batch[i]` is a `Shape`, solved
-    anew from its row: the same to the bit.
+    `iterations` (B,); reading a field that was not asked for raises. `batch[i]` is a `Shape`,
+    solved anew from its row: the same to the bit.
 
     Attributes
     ----------

@@ -7,6 +7,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from tdcr._status import Status
 
+__all__ = [
+    "Backbone",
+    "LinkageSettings",
+    "Robot",
+    "Shape",
+    "Tendon",
+    "__version__",
+    "_forward_batch",
+    "_rotation_vector",
+    "_rust_defaults",
+    "_shape",
+    "_tendon",
+    "forward",
+]
+
 __version__: str
 
 _Floats: TypeAlias = float | Sequence[float] | NDArray[np.float64]
@@ -216,6 +231,7 @@ def _forward_batch(
     threads: int | None,
     progress: Callable[[int], object] | None,
 ) -> dict[str, Any]: ...
+def _rotation_vector(frame: ArrayLike) -> tuple[float, float, float]: ...
 def _rust_defaults() -> dict[str, dict[str, Any]]: ...
 def _tendon(
     azimuth: _Floats,

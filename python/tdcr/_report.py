@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tdcr._core import _rotation_vector
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
     from tdcr._core import Shape
 
-__all__ = ["as_json", "print_demo", "print_shape", "rotation_vector"]
+__all__ = ["as_json", "print_demo", "print_shape"]
 
 
 def as_json(shape: Shape) -> str:
@@ -101,7 +103,7 @@ def print_shape(shape: Shape, unit: str) -> None:
 
 
 def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
-    """Print the table of the demonstration: position and rotation vector of the tip, tendons, effort.
+    """Print the table of the demonstration: pose of the tip, tendons, effort.
 
     Parameters
     ----------
@@ -110,13 +112,22 @@ def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
         Time of each solve [s].
     """
     console = _console()
-    headers = ("tip\n[mm]", "rotation\n[deg]", "tendon length\n[mm]", "status", "steps", "time\n[us]")
-    table = _table(console, "robot", *headers)
+    headers = (
+        "tip\n[mm]",
+        "rotation\n[deg]",
+        "tendon length\n[mm]",
+        "status",
+        "steps",
+        "time\n[us]",
+    )
+    table = _table(console, "robot", *headers, "time\n[us]")
     for shape, time in zip(shapes, times, strict=True):
         lengths = zip(shape.robot.tendon_names, shape.tendon_lengths * 1000.0, strict=True)
         table.add_row(
             _text(shape.robot.name or "unnamed"),
-            "\n".join(f"{x} {value:7.1f}" for x, value in zip("xyz", _millimetres(shape), strict=True)),
+            "\n".join(
+                f"{x} {value:7.1f}" for x, value in zip("xyz", _millimetres(shape), strict=True)
+            ),
             "\n".join(f"{value + 0.0:.1f}" for value in _degrees(shape).round(1)),
             _text("\n".join(f"{name} {length:.1f}" for name, length in lengths)),
             str(shape.status),
@@ -127,37 +138,6 @@ def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
     console.print(table)
 
 
-def rotation_vector(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Axis times angle of a rotation matrix, by the quaternion's largest component.
-
-    Parameters
-    ----------
-    rotation : ndarray, shape (3, 3)
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        [rad], of length 0 to pi.
-    """
-    # q q^T from the entries of R (Shepperd's method): every row is a multiple of q.
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    products = np.array(
-        [
-            [1 + a + e + i, h - f, c - g, d - b],
-            [h - f, 1 + a - e - i, b + d, c + g],
-            [c - g, b + d, 1 - a + e - i, f + h],
-            [d - b, c + g, f + h, 1 - a - e + i],
-        ]
-    )
-    row = products[int(products.diagonal().argmax())]
-    w, v = row[0], row[1:] * (1.0 if row[0] >= 0 else -1.0)
-    sine = float(np.linalg.norm(v))
-    if sine == 0.0:
-        return np.zeros(3)
-    vector: NDArray[np.float64] = v * (2.0 * math.atan2(sine, abs(w)) / sine)
-    return vector
-
-
 def _millimetres(shape: Shape) -> NDArray[np.float64]:
     """Position of the tip, rounded so that no -0.0 is left."""
     rounded: NDArray[np.float64] = (shape.tip[:3, 3] * 1000.0).round(1) + 0.0
@@ -165,8 +145,8 @@ def _millimetres(shape: Shape) -> NDArray[np.float64]:
 
 
 def _degrees(shape: Shape) -> NDArray[np.float64]:
-    tip = shape.tip[:3, :3]
-    return np.degrees(rotation_vector(tip)) if np.isfinite(tip).all() else np.full(3, np.nan)
+    degrees: NDArray[np.float64] = np.degrees(_rotation_vector(shape.tip))
+    return degrees
 
 
 def _vector(values: NDArray[np.float64], digits: int) -> str:

@@ -9,9 +9,10 @@ import sys
 
 import numpy as np
 import pytest
+
 import tdcr
 from tdcr._cli import main
-from tdcr._report import rotation_vector
+from tdcr._core import _rotation_vector
 
 ROBOT = """
 format = 1
@@ -200,4 +201,6 @@ def test_rotation_vectors_up_to_half_a_turn():
         rotation = (
             np.eye(3) + math.sin(angle) * cross + 2 * math.sin(angle / 2) ** 2 * cross @ cross
         )
-        assert rotation_vector(rotation) == pytest.approx(w, abs=1e-14)
+        frame = np.eye(4)
+        frame[:3, :3] = rotation
+        assert _rotation_vector(frame) == pytest.approx(w, abs=1e-14)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from tdcr import Backbone, InvalidInput, Robot, Tendon
 from tdcr._file_schema import BackboneTable, metres
 from tdcr._files import load_robot, robot_schema, save_robot

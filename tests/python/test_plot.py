@@ -9,6 +9,7 @@ from importlib import resources
 
 import numpy as np
 import pytest
+
 from tdcr import Backbone, InvalidInput, Robot, Tendon, forward
 from tdcr._view import plane_of, smooth
 
@@ -17,6 +18,7 @@ matplotlib.use("Agg")
 
 from matplotlib import pyplot  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
+
 from tdcr._plot import plot_shape, save_picture  # noqa: E402
 
 INF = math.inf

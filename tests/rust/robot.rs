@@ -41,7 +41,8 @@ fn stretches_become_subsegments() {
 #[test]
 fn bad_backbones_name_the_argument() {
     type Change = fn(&mut BackboneSpec);
-    let cases: [(&str, Change); 17] = [
+    let cases: [(&str, Change); 18] = [
+        ("subsegments", |s| s.subsegments = vec![usize::MAX]),
         ("length", |s| s.length = vec![]),
         ("length", |s| s.length = vec![0.0]),
         ("length", |s| s.length = vec![-0.1]),

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix4, Vector3};
 use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyTuple, PyType};
@@ -87,8 +87,13 @@ where
             );
             PyTypeError::new_err(message)
         };
-        if let Ok(one) = value.extract() {
-            return Ok(Self::One(one));
+        match value.extract() {
+            Ok(one) => return Ok(Self::One(one)),
+            Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
+                let expected = format!("{kind} of at most 64 bits");
+                return Err(invalid(&InvalidInput::new(argument, expected, value)));
+            }
+            Err(_) => {}
         }
         if value.is_instance_of::<pyo3::types::PyString>() {
             return Err(wrong());

@@ -30,7 +30,7 @@ mod _core {
     #[pymodule_export]
     use crate::settings::{_rust_defaults, LinkageSettings};
     #[pymodule_export]
-    use crate::shape::{_shape, Shape};
+    use crate::shape::{_rotation_vector, _shape, Shape};
     #[pymodule_export]
     use crate::tendon::{_tendon, Tendon};
 

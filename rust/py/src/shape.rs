@@ -273,6 +273,23 @@ impl Shape {
     }
 }
 
+/// Rotation vector of a frame's rotation, for tables.
+///
+/// Parameters
+/// ----------
+/// frame : array_like, shape (4, 4)
+///
+/// Returns
+/// -------
+/// tuple of float
+///     Axis times angle [rad], of length 0 to pi.
+#[pyfunction]
+pub(crate) fn _rotation_vector(frame: &Bound<'_, PyAny>) -> PyResult<(f64, f64, f64)> {
+    let matrix = crate::convert::matrix4("frame", frame)?;
+    let vector = tdcr::lie::so3::log(&matrix.fixed_view::<3, 3>(0, 0).into_owned());
+    Ok((vector.x, vector.y, vector.z))
+}
+
 /// Rebuilds a pickled shape.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // The fields of a result, flat.

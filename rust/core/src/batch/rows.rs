@@ -49,9 +49,16 @@ struct Column {
 }
 
 impl Column {
-    fn new(wanted: bool, rows: usize, width: usize) -> Self {
+    fn new(wanted: bool, rows: usize, width: usize) -> Result<Self, InvalidInput> {
         let width = if wanted { width } else { 0 };
-        Self { width, values: vec![0.0; rows * width] }
+        let mut values = Vec::new();
+        let size = rows.saturating_mul(width);
+        values.try_reserve_exact(size).map_err(|_| {
+            let got = format!("{rows} rows of {width} numbers for one field");
+            InvalidInput::new("displacements", "rows whose fields fit into memory", got)
+        })?;
+        values.resize(size, 0.0);
+        Ok(Self { width, values })
     }
 
     /// Mutable pieces of `rows` rows each; empty pieces forever when the field is not wanted.
@@ -112,8 +119,8 @@ const ROWS_PER_JOB: usize = 32;
 /// stopped.
 ///
 /// # Errors
-/// `InvalidInput` naming the first row that is not usable; the numbers are checked before any row is
-/// solved.
+/// `InvalidInput` naming the first row that is not usable (the numbers are checked before any row is
+/// solved), or when the wanted fields do not fit into memory.
 pub fn solve_rows<M: Model>(
     model: &M,
     displacements: &[f64],
@@ -131,7 +138,7 @@ pub fn solve_rows<M: Model>(
     }
     let blank = Report { status: Status::NumericalError, residual: f64::NAN, iterations: 0 };
     let mut reports = vec![blank; rows];
-    let mut columns = allocate(robot, fields, rows);
+    let mut columns = allocate(robot, fields, rows)?;
     let failed = {
         let mut pieces: Vec<Pieces<'_>> =
             columns.iter_mut().map(|column| column.pieces(ROWS_PER_JOB)).collect();
@@ -190,23 +197,24 @@ fn run<M: Model>(
 }
 
 /// Columns in the order of [`write_row`]: seven fields, then the points of each tendon.
-fn allocate(robot: &Robot, wanted: Fields, rows: usize) -> Vec<Column> {
+fn allocate(robot: &Robot, wanted: Fields, rows: usize) -> Result<Vec<Column>, InvalidInput> {
     let n = robot.backbone().subsegments();
     let tendons = robot.tendons().len();
-    let mut columns = vec![
-        Column::new(wanted.tip, rows, 16),
-        Column::new(wanted.frames, rows, 16 * (n + 1)),
-        Column::new(wanted.positions, rows, 3 * (n + 1)),
-        Column::new(wanted.strains, rows, 3 * n),
-        Column::new(wanted.tendon_lengths, rows, tendons),
-        Column::new(wanted.tensions, rows, tendons),
-        Column::new(wanted.energy, rows, 1),
+    let widths = [
+        (wanted.tip, 16),
+        (wanted.frames, 16 * (n + 1)),
+        (wanted.positions, 3 * (n + 1)),
+        (wanted.strains, 3 * n),
+        (wanted.tendon_lengths, tendons),
+        (wanted.tensions, tendons),
+        (wanted.energy, 1),
     ];
-    columns.extend(
-        (robot.paths().iter())
-            .map(|path| Column::new(wanted.tendon_points, rows, 3 * (path.end() + 1))),
-    );
-    columns
+    let points = robot.paths().iter().map(|path| (wanted.tendon_points, 3 * (path.end() + 1)));
+    widths
+        .into_iter()
+        .chain(points)
+        .map(|(wanted, width)| Column::new(wanted, rows, width))
+        .collect()
 }
 
 fn write_row(kind: usize, place: &mut [f64], robot: &Robot, state: &State) {

@@ -42,6 +42,9 @@ impl BackboneSpec {
     }
 }
 
+/// Subsegments of a backbone at most: far beyond any robot, and far within any memory.
+const MOST_SUBSEGMENTS: usize = 1_000_000;
+
 /// A checked backbone. Disks are numbered 0 (base) to n (tip); subsegment i joins disks i and i + 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Backbone {
@@ -55,7 +58,7 @@ impl Backbone {
     ///
     /// # Errors
     /// `InvalidInput` naming the field: no stretch, a length that is not positive, a stretch without
-    /// subsegments, Poisson's ratio outside (-1, 0.5], a rest shape of another length than the
+    /// subsegments, more than a million of them, Poisson's ratio outside (-1, 0.5], a rest shape of another length than the
     /// backbone or bent by more than pi per subsegment, Young's modulus without diameter, a
     /// modulus, diameter or disk radius that is not positive.
     pub fn new(mut spec: BackboneSpec) -> Result<Self, InvalidInput> {
@@ -73,7 +76,11 @@ impl Backbone {
         if let Some(count) = spec.subsegments.iter().find(|&&count| count < 1) {
             return Err(InvalidInput::new("subsegments", "at least 1 per stretch", count));
         }
-        let n: usize = spec.subsegments.iter().sum();
+        let n = (spec.subsegments.iter()).fold(0_usize, |sum, count| sum.saturating_add(*count));
+        if n > MOST_SUBSEGMENTS {
+            let expected = format!("at most {MOST_SUBSEGMENTS} in all");
+            return Err(InvalidInput::new("subsegments", expected, n));
+        }
         spec.poisson_ratio = finite("poisson_ratio", "1", spec.poisson_ratio)?;
         if spec.poisson_ratio <= -1.0 || spec.poisson_ratio > 0.5 {
             let got = spec.poisson_ratio;
