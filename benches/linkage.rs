@@ -1,6 +1,6 @@
 //! The linkage model's hot paths.
 //!
-//! `seven_bar`: one solve from the linear start (not from the closed form), alike and differing holes.
+//! `seven_bar`: one solve from its own start (which is not the closed form), alike and differing holes.
 //! `chain_*`: whole robots per subsegment; `varied` changes its radii from disk to disk, so that every
 //! subsegment is a solve of its own, `uniform` solves one and reuses it. `batch`: rows on one and all
 //! threads. Every bench checks its answer first.

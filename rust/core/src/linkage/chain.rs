@@ -74,6 +74,8 @@ impl<'r> Linkage<'r> {
         let mut frame = *self.robot.base();
         let mut last: Option<(Question, Answer)> = None;
         state.clear();
+        state.frames.reserve(lengths.len() + 1);
+        state.strains.reserve(lengths.len());
         state.frames.push(frame);
         for (index, run) in self.runs.iter().enumerate() {
             for i in run.first..run.last {

@@ -6,7 +6,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::seven_bar::{Hole, TINY_BEND};
+use super::seven_bar::{Hole, TINY_BEND, third_order};
 use crate::solve::sqp::{Linearization, Problem};
 
 /// Minimum of the squared coupler angle of a planar subsegment. Lengths in units of the rest length
@@ -16,6 +16,7 @@ pub struct FourBar {
     lower: f64,
     upper: f64,
     shortfall: f64,
+    pull: f64,
     /// Weight of the squared angles between crank and disk axes; see
     /// [`SevenBar::new`](super::seven_bar::SevenBar::new).
     bisection: f64,
@@ -40,7 +41,14 @@ impl FourBar {
         let alike = hole.is_alike();
         let bend = (shortfall / upper).abs();
         let crank_unit = if alike { 1.0 / bend.clamp(TINY_BEND, 1.0) } else { 1.0 };
-        Self { lower, upper, shortfall, bisection: if alike { 0.0 } else { 1.0 }, crank_unit }
+        Self {
+            lower,
+            upper,
+            shortfall,
+            pull: hole.pull,
+            bisection: if alike { 0.0 } else { 1.0 },
+            crank_unit,
+        }
     }
 
     /// Whether the pull is so small that the start is the answer; see
@@ -50,10 +58,10 @@ impl FourBar {
         self.crank_unit >= 1.0 / TINY_BEND
     }
 
-    /// Bent as the linear theory of tendons has it.
+    /// Bent as the theory of tendons has it to third order.
     #[must_use]
     pub fn start(&self) -> Bend {
-        let disk = (2.0 * self.shortfall / (self.lower + self.upper)).min(2.0);
+        let disk = third_order(2.0 * self.pull / (self.lower + self.upper));
         Bend { disk, link: 0.5 * disk }
     }
 }

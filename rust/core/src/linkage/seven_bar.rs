@@ -108,8 +108,8 @@ impl<const M: usize> SevenBar<M> {
         self.crank_unit >= 1.0 / TINY_BEND
     }
 
-    /// Bent as the linear theory of tendons has it, link at half the bend: on the right side of the
-    /// mirror, and not the answer.
+    /// Bent as the theory of tendons has it to third order, link at half the bend: on the right side
+    /// of the mirror, and not the answer.
     #[must_use]
     pub fn start(&self) -> Pose {
         let rows = self.couplers.each_ref().map(|c| (0.5 * (c.lower + c.upper), c.pull));
@@ -119,8 +119,15 @@ impl<const M: usize> SevenBar<M> {
         if bend < 1e-140 {
             return Pose::bent(c.hypot(s), s.atan2(c));
         }
-        Pose::bent_towards(bend.min(2.0), c / bend, s / bend)
+        Pose::bent_towards(third_order(bend), c / bend, s / bend)
     }
+}
+
+/// `2 asin(x/2) = x + x^3/24 + 3 x^5/640 + ...`, cut after its second term: the bend from its linear
+/// value, at most 2.3 rad \[rad\].
+pub(super) fn third_order(x: f64) -> f64 {
+    let x = x.min(2.0);
+    x + x * x * x / 24.0
 }
 
 /// `(bend cos, bend sin)` to first order, from one or two holes and their pulls: `hole . (c, s) =
