@@ -40,6 +40,16 @@ class Backbone:
         diameter: _Floats | None = None,
         disk_radius: float | None = None,
     ) -> Self: ...
+    @staticmethod
+    def from_curve(
+        points: ArrayLike,
+        subsegments: int,
+        *,
+        poisson_ratio: float = 0.35,
+        youngs_modulus: float | None = None,
+        diameter: _Floats | None = None,
+        disk_radius: float | None = None,
+    ) -> Backbone: ...
     @property
     def length(self) -> float | tuple[float, ...]: ...
     @property

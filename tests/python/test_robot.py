@@ -240,3 +240,18 @@ def test_bad_settings_name_the_argument(argument, keywords):
     with pytest.raises(tdcr.InvalidInput) as caught:
         tdcr.LinkageSettings(**keywords)
     assert caught.value.argument == argument
+
+
+def test_backbones_follow_curves():
+    # A quarter circle of radius 0.1 towards +x, which starts along z.
+    angle = np.linspace(0, np.pi / 2, 200)
+    points = 0.1 * np.stack([1 - np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
+    backbone = tdcr.Backbone.from_curve(points, 8, diameter=0.002)
+    assert backbone.total_length == pytest.approx(0.1 * np.pi / 2, rel=1e-9)
+    assert backbone.diameter == 0.002
+    assert np.allclose(backbone.rest, [[0, np.pi / 16, 0]] * 8, atol=1e-7)
+    bent = tdcr.Robot(backbone, [])
+    assert np.allclose(bent.rest_frames[-1][:3, 3], [0.1, 0, 0.1], atol=1e-8)
+    with pytest.raises(tdcr.InvalidInput, match="shape") as caught:
+        tdcr.Backbone.from_curve([0, 1, 2], 8)
+    assert caught.value.argument == "points"

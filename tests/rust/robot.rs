@@ -232,3 +232,70 @@ fn stiffness_follows_the_diameter() {
     assert!((plain.strain_energy(0, &Vector3::x()) - 10.0).abs() < 1e-14);
     assert!((plain.strain_energy(0, &Vector3::z()) - 10.0 / 1.35).abs() < 1e-14);
 }
+
+/// Points of a helix of radius r and pitch 2 pi h that starts along z, by arc length.
+fn helix(r: f64, h: f64, s: f64) -> Vector3<f64> {
+    let rate = r.hypot(h);
+    let t = s / rate;
+    // Axis, binormal and radius of the helix in a frame whose z is its first tangent.
+    let (along, across) = (h / rate, r / rate);
+    let local = Vector3::new(r * (1.0 - t.cos()), r * t.sin(), h * t);
+    Vector3::new(local.x, along * local.y - across * local.z, across * local.y + along * local.z)
+}
+
+/// Order 4 in the spacing of the points, order 2 in the subsegments, and no twist.
+#[test]
+fn backbones_follow_curves() {
+    let (r, h, length) = (0.05, 0.03, 0.3);
+    let sample = |m: usize| -> Vec<Vector3<f64>> {
+        (0..m).map(|i| helix(r, h, length * i as f64 / (m - 1) as f64)).collect()
+    };
+    let build = |m: usize, n: usize| {
+        let backbone = Backbone::from_curve(&sample(m), BackboneSpec::straight(1.0, n)).unwrap();
+        Robot::new(backbone, vec![], None, None, None).unwrap()
+    };
+    let length_error = |m| (build(m, 4).backbone().total_length() - length).abs() / length;
+    for m in [20, 40, 80, 160, 320] {
+        println!("{m} points: length off by {:.1e}", length_error(m));
+    }
+    // Order 4: its two parts, from the ends and from within, differ in sign and cancel on the way.
+    assert!(length_error(160) / length_error(320) > 14.0);
+    assert!(length_error(20) < 1e-5 && length_error(160) < 1e-9);
+    let tip_error = |n: usize| {
+        let robot = build(2000, n);
+        (robot.rest_frames()[n].translation - helix(r, h, length)).norm() / length
+    };
+    for n in [10, 20, 40] {
+        let ratio = tip_error(n) / tip_error(2 * n);
+        assert!((3.8..4.2).contains(&ratio), "{n} {ratio} {:e}", tip_error(n));
+    }
+    // Rotation-minimising: hardly any torsion, though the helix has some; curvature r / (r^2 + h^2).
+    let robot = build(400, 50);
+    let bend = r / (r * r + h * h) * length / 50.0;
+    for i in 0..50 {
+        let rest = robot.backbone().rest(i);
+        assert!(rest.z.abs() < 0.02 * bend && (rest.norm() / bend - 1.0).abs() < 2e-3, "{rest}");
+    }
+}
+
+#[test]
+fn curves_of_few_points_and_bad_ones() {
+    let spec = || BackboneSpec::straight(1.0, 3);
+    let line = [Vector3::zeros(), Vector3::new(0.0, 0.0, 0.2)];
+    let backbone = Backbone::from_curve(&line, spec()).unwrap();
+    assert!((backbone.total_length() - 0.2).abs() < 1e-16 && backbone.is_straight());
+    // A line in another direction is a straight backbone too, up to rounding.
+    let oblique = [Vector3::new(1.0, 1.0, 1.0), Vector3::new(0.9, 1.2, 1.3)];
+    let backbone = Backbone::from_curve(&oblique, spec()).unwrap();
+    assert!((0..3).all(|i| backbone.rest(i).amax() < 1e-15));
+    let down = [Vector3::zeros(), Vector3::new(0.0, 0.0, -0.2)];
+    assert!(Backbone::from_curve(&down, spec()).unwrap().rest(0).amax() < 1e-15);
+    let nan = Vector3::new(f64::NAN, 0.0, 0.0);
+    let bad: [&[Vector3<f64>]; 4] =
+        [&[], &line[..1], &[line[0], line[0], line[1]], &[line[0], nan]];
+    for points in bad {
+        assert_eq!(Backbone::from_curve(points, spec()).unwrap_err().argument, "points");
+    }
+    let none = BackboneSpec::straight(1.0, 0);
+    assert_eq!(Backbone::from_curve(&line, none).unwrap_err().argument, "subsegments");
+}

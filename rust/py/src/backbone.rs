@@ -44,6 +44,11 @@ use crate::convert::{
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Backbone(pub(crate) core::Backbone);
 
+fn diameters(diameter: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
+    let extract = |d| OneOrMany::<f64>::extract("diameter", "a number", d);
+    Ok(diameter.map(extract).transpose()?.map(OneOrMany::into_vec))
+}
+
 #[pymethods]
 impl Backbone {
     #[new]
@@ -59,20 +64,59 @@ impl Backbone {
         disk_radius: Option<f64>,
     ) -> PyResult<Self> {
         let counts = OneOrMany::<i64>::extract("subsegments", "an int", subsegments)?.into_vec();
-        let diameter = diameter
-            .map(|d| OneOrMany::<f64>::extract("diameter", "a number", d))
-            .transpose()?
-            .map(OneOrMany::into_vec);
         let spec = BackboneSpec {
             length: OneOrMany::<f64>::extract("length", "a number", length)?.into_vec(),
             subsegments: counts.into_iter().map(count).collect(),
             poisson_ratio,
             rest: rest.map(|rest| vectors("rest", rest)).transpose()?,
             youngs_modulus,
-            diameter,
+            diameter: diameters(diameter)?,
             disk_radius,
         };
         core::Backbone::new(spec).map(Self).map_err(|e| invalid(&e))
+    }
+
+    /// A pre-bent backbone along a curve in space.
+    ///
+    /// A cubic spline goes through the points; the rest rotation vectors are those of frames that do
+    /// not twist about it. The rest shape starts at the robot's base frame: it lies on the curve where
+    /// the curve starts along the base's z axis, and is the curve moved there otherwise. The arcs of
+    /// the subsegments meet the curve's tangents exactly and its points to order 2 in their number.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array_like, shape (m, 3)
+    ///     At least two points along the curve, base first [m]. The backbone's length is the spline's.
+    /// subsegments : int
+    ///     Number of equal subsegments.
+    /// poisson_ratio, youngs_modulus, diameter, disk_radius
+    ///     As for `Backbone`.
+    ///
+    /// Raises
+    /// ------
+    /// InvalidInput
+    ///     Points that repeat or are not finite, a curve that bends by more than pi per subsegment.
+    #[staticmethod]
+    #[pyo3(signature = (points, subsegments, *, poisson_ratio=0.35, youngs_modulus=None,
+                        diameter=None, disk_radius=None))]
+    fn from_curve(
+        points: &Bound<'_, PyAny>,
+        subsegments: i64,
+        poisson_ratio: f64,
+        youngs_modulus: Option<f64>,
+        diameter: Option<&Bound<'_, PyAny>>,
+        disk_radius: Option<f64>,
+    ) -> PyResult<Self> {
+        let spec = BackboneSpec {
+            poisson_ratio,
+            youngs_modulus,
+            diameter: diameters(diameter)?,
+            disk_radius,
+            ..BackboneSpec::straight(1.0, count(subsegments))
+        };
+        core::Backbone::from_curve(&vectors("points", points)?, spec)
+            .map(Self)
+            .map_err(|e| invalid(&e))
     }
 
     /// Length of the backbone, or of each stretch [m]: float or tuple of float.

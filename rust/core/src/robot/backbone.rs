@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::bits::{Bits, hash_by_bits};
+use super::curve::rest_from_curve;
 use crate::error::{InvalidInput, finite, positive};
 
 /// What a backbone is described by, before it is checked. See [`Backbone::new`].
@@ -95,6 +96,35 @@ impl Backbone {
             .collect();
         let arc_lengths = arc_lengths(&spec.length, &spec.subsegments);
         Ok(Self { spec, lengths, arc_lengths })
+    }
+
+    /// A pre-bent backbone along a curve: `spec` with its length and rest shape taken from a spline
+    /// through `points` \[m\], cut into its (one) number of subsegments.
+    ///
+    /// Rest rotation vectors are those of frames that do not twist about the curve. The rest shape
+    /// starts at the base frame, so it lies on the curve where the curve starts along the base's z
+    /// axis; elsewhere it is the curve moved there. Arcs of constant strain meet the curve's tangents
+    /// exactly and its points to order 2 in the number of subsegments.
+    ///
+    /// # Errors
+    /// As [`Backbone::new`], and for fewer than two points, points that are not finite or that repeat,
+    /// or more than one stretch.
+    pub fn from_curve(
+        points: &[Vector3<f64>],
+        mut spec: BackboneSpec,
+    ) -> Result<Self, InvalidInput> {
+        let &[count] = spec.subsegments.as_slice() else {
+            let expected = "one count for the whole curve";
+            return Err(InvalidInput::new("subsegments", expected, spec.subsegments.len()));
+        };
+        if count > MOST_SUBSEGMENTS {
+            let expected = format!("at most {MOST_SUBSEGMENTS} in all");
+            return Err(InvalidInput::new("subsegments", expected, count));
+        }
+        let (length, rest) = rest_from_curve(points, count)?;
+        spec.length = vec![length];
+        spec.rest = Some(rest);
+        Self::new(spec)
     }
 
     /// The description it was made from.

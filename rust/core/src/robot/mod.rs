@@ -2,6 +2,7 @@
 
 mod backbone;
 mod bits;
+mod curve;
 mod tendon;
 
 use nalgebra::{Matrix4, Vector3};
