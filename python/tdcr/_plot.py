@@ -135,7 +135,7 @@ def save_picture(shape: Shape, path: str | os.PathLike[str], **options: Any) -> 
         )
     flat = _is_flat(options.get("view", "auto"), plane_of(shape), None)
     plot_shape(shape, ax=_axes(figure, flat), **options)
-    figure.savefig(path, dpi=160)
+    figure.savefig(path, dpi=160, bbox_inches="tight")
 
 
 def _require_matplotlib() -> None:

@@ -120,7 +120,7 @@ def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
         "steps",
         "time\n[us]",
     )
-    table = _table(console, "robot", *headers, "time\n[us]")
+    table = _table(console, "robot", *headers)
     for shape, time in zip(shapes, times, strict=True):
         lengths = zip(shape.robot.tendon_names, shape.tendon_lengths * 1000.0, strict=True)
         table.add_row(
