@@ -72,11 +72,27 @@ class ShapeBatch(Sequence["Shape"]):
         settings: LinkageSettings | None,
         columns: dict[str, Any],
     ) -> None:
-        self.robot = robot
-        self.displacements = displacements
-        self.model = model
-        self.settings = settings
-        self._columns = columns
+        self.__dict__.update(
+            robot=robot,
+            displacements=displacements,
+            model=model,
+            settings=settings,
+            _columns=columns,
+        )
+
+    robot: Robot
+    displacements: NDArray[np.float64]
+    model: str
+    settings: LinkageSettings | None
+    _columns: dict[str, Any]
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Refuse: a result does not change."""
+        raise AttributeError(f"{name}: a ShapeBatch cannot be changed")
+
+    def __delattr__(self, name: str) -> None:
+        """Refuse: a result does not change."""
+        raise AttributeError(f"{name}: a ShapeBatch cannot be changed")
 
     def __getattr__(self, name: str) -> Any:
         """Return a computed field; tell how to get one that was not asked for."""
@@ -100,6 +116,21 @@ class ShapeBatch(Sequence["Shape"]):
         """Names of the fields that were asked for."""
         return tuple(name for name in FIELDS if name in self._columns)
 
+    def __eq__(self, other: object) -> bool:
+        """Compare by value: the same robot, rows, model, settings and computed fields."""
+        if not isinstance(other, ShapeBatch):
+            return NotImplemented
+        return (
+            (self.robot, self.model, self.settings) == (other.robot, other.model, other.settings)
+            and np.array_equal(self.displacements, other.displacements)
+            and self._columns.keys() == other._columns.keys()
+            and all(_same(mine, other._columns[name]) for name, mine in self._columns.items())
+        )
+
+    def __hash__(self) -> int:
+        """Hash by robot and rows."""
+        return hash((self.robot, self.model, self.displacements.tobytes()))
+
     def __len__(self) -> int:
         """Return the number of rows B."""
         return len(self.displacements)
@@ -118,6 +149,12 @@ class ShapeBatch(Sequence["Shape"]):
             f"<ShapeBatch of {len(self)} rows, {converged} converged: "
             f"fields {', '.join(self.fields) or 'none'}, model {self.model!r}>"
         )
+
+
+def _same(mine: Any, theirs: Any) -> bool:
+    if isinstance(mine, list):
+        return all(_same(a, b) for a, b in zip(mine, theirs, strict=True))
+    return np.array_equal(mine, theirs, equal_nan=mine.dtype.kind == "f")
 
 
 def forward_batch(

@@ -100,6 +100,19 @@ def test_batches_behave_as_sequences():
     assert twin[4] == batch[4]
 
 
+def test_batches_are_values():
+    batch = solve(rows(30), fields=FIELDS)
+    twin = pickle.loads(pickle.dumps(batch))
+    assert twin == batch
+    assert hash(twin) == hash(batch)
+    assert batch != solve(rows(30), fields="tip")
+    assert batch != solve(rows(29), fields=FIELDS)
+    assert batch != "batch"
+    for change in (lambda: setattr(batch, "robot", None), lambda: delattr(batch, "model")):
+        with pytest.raises(AttributeError, match="cannot be changed"):
+            change()
+
+
 def test_empty_batches_are_fine():
     batch = solve(np.zeros((0, 2)), fields=FIELDS)
     assert len(batch) == 0
