@@ -8,6 +8,7 @@
 )]
 
 mod batch;
+mod constant_curvature;
 mod lie;
 mod linkage_bars;
 mod linkage_chain;

@@ -26,6 +26,7 @@
 #![forbid(unsafe_code)]
 
 pub mod batch;
+pub mod constant_curvature;
 pub mod error;
 pub mod lie;
 pub mod linkage;

@@ -15,6 +15,8 @@ pub struct State {
     pub frames: Vec<Pose>,
     /// Rotation vector of every element in the frame of its own base \[rad\].
     pub strains: Vec<Vector3<f64>>,
+    /// Relative elongation of every element; empty where the model has none.
+    pub elongations: Vec<f64>,
     /// Length of every tendon from the base to its end \[m\].
     pub tendon_lengths: Vec<f64>,
     /// Tension of every tendon; NaN in models that know no forces.
@@ -28,6 +30,7 @@ impl State {
     pub fn clear(&mut self) {
         self.frames.clear();
         self.strains.clear();
+        self.elongations.clear();
         self.tendon_lengths.clear();
         self.tensions.clear();
         self.energy = 0.0;

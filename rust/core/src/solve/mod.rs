@@ -1,3 +1,4 @@
 //! Solvers: they see functions, gradients and block structure, never robots.
 
+pub mod least_squares;
 pub mod sqp;

@@ -1,0 +1,12 @@
+//! Constant curvature: every segment an arc of a circle (opencontinuumrobotics.com).
+
+mod arc;
+mod chain;
+mod mapping;
+
+pub use arc::Arc;
+pub use chain::{
+    ConstantCurvature, ConstantCurvatureSettings, Coupling, Plan, Workspace, displacements,
+    tip_derivative,
+};
+pub use mapping::{Fit, Length, Mapping};

@@ -1,0 +1,55 @@
+//! Linear least squares of small systems, minimum-norm where they are deficient.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Singular values below this share of the largest count as zero.
+const DEFICIENT: f64 = 1e-10;
+
+/// The Moore-Penrose inverse of a matrix, by its singular value decomposition.
+#[derive(Clone, Debug)]
+pub struct PseudoInverse {
+    /// The inverse itself: columns x rows of the matrix.
+    pub matrix: DMatrix<f64>,
+    /// Number of singular values that count.
+    pub rank: usize,
+    /// Largest over smallest singular value that counts; 1 for an empty matrix.
+    pub condition: f64,
+}
+
+impl PseudoInverse {
+    /// Of a matrix with finite entries.
+    #[must_use]
+    pub fn new(matrix: &DMatrix<f64>) -> Self {
+        let (rows, columns) = matrix.shape();
+        let mut inverse = DMatrix::zeros(columns, rows);
+        if rows == 0 || columns == 0 {
+            return Self { matrix: inverse, rank: 0, condition: 1.0 };
+        }
+        let decomposition = matrix.clone().svd(true, true);
+        let values = &decomposition.singular_values;
+        let largest = values.max();
+        let mut rank = 0;
+        let mut smallest = largest;
+        if let (Some(u), Some(v)) = (&decomposition.u, &decomposition.v_t) {
+            for (k, &value) in values.iter().enumerate() {
+                if value > DEFICIENT * largest {
+                    rank += 1;
+                    smallest = smallest.min(value);
+                    inverse += v.row(k).transpose() * u.column(k).transpose() / value;
+                }
+            }
+        }
+        // The decomposition leaves some 1e-14; one step of Ben-Israel and Cohen's iteration, which
+        // converges quadratically and keeps the rank, leaves the rounding.
+        let twice = &inverse * 2.0;
+        inverse = twice - &inverse * matrix * &inverse;
+        let condition = if rank > 0 { largest / smallest } else { 1.0 };
+        Self { matrix: inverse, rank, condition }
+    }
+
+    /// The least-squares answer of minimum norm.
+    #[must_use]
+    pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+        &self.matrix * right
+    }
+}
