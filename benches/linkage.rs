@@ -14,7 +14,7 @@ use tdcr::Status;
 use tdcr::batch::{Control, Fields, pool, solve_rows};
 use tdcr::linkage::four_bar::FourBar;
 use tdcr::linkage::seven_bar::{Hole, SevenBar};
-use tdcr::linkage::{Linkage, LinkageSettings, Workspace};
+use tdcr::linkage::{Linkage, LinkageSettings, Plan, Workspace};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
 use tdcr::solve::sqp::{Ending, minimize};
@@ -70,7 +70,8 @@ fn chains(c: &mut Criterion) {
         let mut group = c.benchmark_group(name);
         for n in [10, 100, 1000] {
             let robot = trunk(n, varied);
-            let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+            let plan = Plan::new(&robot).unwrap();
+            let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
             let pull = 0.02 * n as f64;
             let displacements = [-0.06 * pull, -0.04 * pull];
             let mut work = Workspace::default();
@@ -88,7 +89,8 @@ fn chains(c: &mut Criterion) {
 
 fn batches(c: &mut Criterion) {
     let robot = trunk(20, true);
-    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let plan = Plan::new(&robot).unwrap();
+    let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
     let rows = 2000_u32;
     let displacements: Vec<f64> =
         (0..rows).flat_map(|i| [-1e-5 * f64::from(i), -0.5e-5 * f64::from(i)]).collect();

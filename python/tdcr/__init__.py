@@ -15,14 +15,25 @@ tendon's length inside the robot: negative pulls.
 
 from __future__ import annotations
 
+from tdcr import constant_curvature
 from tdcr._batch import ShapeBatch, forward_batch
-from tdcr._core import Backbone, LinkageSettings, Robot, Shape, Tendon, forward
+from tdcr._core import (
+    Backbone,
+    ConstantCurvatureSettings,
+    LinkageSettings,
+    Robot,
+    Shape,
+    Tendon,
+    forward,
+    jacobian,
+)
 from tdcr._core import __version__ as __version__
 from tdcr._status import Status
 from tdcr.errors import InvalidInput, NotConverged, TdcrError
 
 __all__ = [
     "Backbone",
+    "ConstantCurvatureSettings",
     "InvalidInput",
     "LinkageSettings",
     "NotConverged",
@@ -32,6 +43,8 @@ __all__ = [
     "Status",
     "TdcrError",
     "Tendon",
+    "constant_curvature",
     "forward",
     "forward_batch",
+    "jacobian",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from tdcr.errors import InvalidInput
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tdcr._core import LinkageSettings, Robot, Shape
+    from tdcr._core import ConstantCurvatureSettings, LinkageSettings, Robot, Shape
+
+    Settings: TypeAlias = LinkageSettings | ConstantCurvatureSettings
 
 __all__ = ["ShapeBatch", "forward_batch"]
 
@@ -50,7 +52,7 @@ class ShapeBatch(Sequence["Shape"]):
     positions : ndarray, shape (B, n + 1, 3)
         Centre of every disk [m].
     strains : ndarray, shape (B, n, 3)
-        Rotation vector of every element [rad].
+        Rotation vector of every element [rad]; (B, n, 4) with the elongation in extensible models.
     tendon_points : list of ndarray, shape (B, end + 1, 3)
         Holes of every tendon [m].
     tendon_lengths : ndarray, shape (B, K)
@@ -69,7 +71,7 @@ class ShapeBatch(Sequence["Shape"]):
         robot: Robot,
         displacements: NDArray[np.float64],
         model: str,
-        settings: LinkageSettings | None,
+        settings: Settings | None,
         columns: dict[str, Any],
     ) -> None:
         self.__dict__.update(
@@ -83,7 +85,7 @@ class ShapeBatch(Sequence["Shape"]):
     robot: Robot
     displacements: NDArray[np.float64]
     model: str
-    settings: LinkageSettings | None
+    settings: Settings | None
     _columns: dict[str, Any]
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -162,7 +164,7 @@ def forward_batch(
     displacements: ArrayLike,
     *,
     model: str,
-    settings: LinkageSettings | None = None,
+    settings: Settings | None = None,
     fields: Sequence[str] = ("tip",),
     threads: int | None = None,
     progress: bool | Callable[[int], object] = False,

@@ -9,17 +9,23 @@ from tdcr._status import Status
 
 __all__ = [
     "Backbone",
+    "ConstantCurvatureSettings",
     "LinkageSettings",
     "Robot",
     "Shape",
     "Tendon",
     "__version__",
+    "_arc_frames",
+    "_arc_from_displacements",
+    "_arc_jacobian",
+    "_displacements_from_arc",
     "_forward_batch",
     "_rotation_vector",
     "_rust_defaults",
     "_shape",
     "_tendon",
     "forward",
+    "jacobian",
 ]
 
 __version__: str
@@ -180,6 +186,18 @@ class LinkageSettings:
     def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
 
 @final
+class ConstantCurvatureSettings:
+    def __new__(cls, *, coupling: str = "coupled", extensible: bool = False) -> Self: ...
+    @property
+    def coupling(self) -> str: ...
+    @property
+    def extensible(self) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
 class Shape:
     @property
     def robot(self) -> Robot: ...
@@ -229,18 +247,55 @@ def forward(
     displacements: ArrayLike,
     *,
     model: str,
-    settings: LinkageSettings | None = None,
+    settings: LinkageSettings | ConstantCurvatureSettings | None = None,
 ) -> Shape: ...
+def jacobian(
+    robot: Robot,
+    displacements: ArrayLike,
+    *,
+    model: str,
+    settings: LinkageSettings | ConstantCurvatureSettings | None = None,
+) -> _Array: ...
 def _forward_batch(
     robot: Robot,
     displacements: ArrayLike,
     *,
     model: str,
-    settings: LinkageSettings | None,
+    settings: LinkageSettings | ConstantCurvatureSettings | None,
     fields: list[str],
     threads: int | None,
     progress: Callable[[int], object] | None,
 ) -> dict[str, Any]: ...
+def _arc_from_displacements(
+    displacements: ArrayLike,
+    azimuth: ArrayLike,
+    radius: ArrayLike,
+    length: float,
+    ell: float | None,
+    extensible: bool,
+) -> tuple[_Array, _Array, _Array, _Array]: ...
+def _displacements_from_arc(
+    kappa: ArrayLike,
+    phi: ArrayLike,
+    ell: ArrayLike,
+    azimuth: ArrayLike,
+    radius: ArrayLike,
+    length: float | None,
+) -> _Array: ...
+def _arc_frames(
+    kappa: ArrayLike,
+    phi: ArrayLike,
+    ell: ArrayLike,
+    points: int,
+    base: ArrayLike | None,
+) -> _Array: ...
+def _arc_jacobian(
+    kappa: ArrayLike,
+    phi: ArrayLike,
+    ell: ArrayLike,
+    base: ArrayLike | None,
+    tool: ArrayLike | None,
+) -> _Array: ...
 def _rotation_vector(frame: ArrayLike) -> tuple[float, float, float]: ...
 def _rust_defaults() -> dict[str, dict[str, Any]]: ...
 def _tendon(

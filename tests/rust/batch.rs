@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use tdcr::Status;
 use tdcr::batch::{Control, Fields, pool, solve_rows};
-use tdcr::linkage::{Linkage, LinkageSettings};
+use tdcr::linkage::{Linkage, LinkageSettings, Plan};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
 
@@ -38,7 +38,8 @@ fn rows() -> Vec<f64> {
 #[test]
 fn rows_equal_single_solves_on_any_number_of_threads() {
     let robot = robot();
-    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let plan = Plan::new(&robot).unwrap();
+    let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
     let rows = rows();
     let solve = |threads| {
         let control = Control::default();
@@ -71,7 +72,8 @@ fn rows_equal_single_solves_on_any_number_of_threads() {
 #[test]
 fn fields_that_were_not_wanted_are_empty() {
     let robot = robot();
-    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let plan = Plan::new(&robot).unwrap();
+    let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
     let fields = Fields { energy: true, ..Fields::default() };
     let pool = pool(None).unwrap();
     let columns = solve_rows(&model, &rows(), 1001, fields, &pool, &Control::default());
@@ -83,7 +85,8 @@ fn fields_that_were_not_wanted_are_empty() {
 #[test]
 fn bad_rows_are_named_and_the_first_one_wins() {
     let robot = robot();
-    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let plan = Plan::new(&robot).unwrap();
+    let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
     let mut bad = rows();
     bad[2 * 900] = f64::NAN;
     bad[2 * 77 + 1] = f64::NEG_INFINITY;
@@ -95,7 +98,8 @@ fn bad_rows_are_named_and_the_first_one_wins() {
     let backbone = Backbone::new(BackboneSpec::straight(0.2, 5)).unwrap();
     let twins = vec![Tendon::straight(0.0, 0.01).unwrap(); 2];
     let robot = Robot::new(backbone, twins, None, None, None).unwrap();
-    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let plan = Plan::new(&robot).unwrap();
+    let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
     let mut rows = vec![0.0; 400];
     rows[2 * 150] = -0.001;
     rows[2 * 150 + 1] = -0.001;
@@ -108,7 +112,8 @@ fn bad_rows_are_named_and_the_first_one_wins() {
 #[test]
 fn a_stopped_batch_returns_nothing() {
     let robot = robot();
-    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let plan = Plan::new(&robot).unwrap();
+    let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
     let control = Control::default();
     control.stop.store(true, Ordering::Relaxed);
     let pool = pool(Some(2)).unwrap();
@@ -118,13 +123,15 @@ fn a_stopped_batch_returns_nothing() {
 #[test]
 fn empty_batches_and_robots_without_tendons_are_fine() {
     let robot = robot();
-    let model = Linkage::new(&robot, LinkageSettings::default()).unwrap();
+    let plan = Plan::new(&robot).unwrap();
+    let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
     let pool = pool(Some(2)).unwrap();
     let columns = solve_rows(&model, &[], 0, ALL, &pool, &Control::default()).unwrap().unwrap();
     assert!(columns.tip.is_empty() && columns.reports.is_empty());
     let backbone = Backbone::new(BackboneSpec::straight(0.2, 5)).unwrap();
     let bare = Robot::new(backbone, vec![], None, None, None).unwrap();
-    let model = Linkage::new(&bare, LinkageSettings::default()).unwrap();
+    let plan = Plan::new(&bare).unwrap();
+    let model = Linkage::new(&bare, &plan, LinkageSettings::default()).unwrap();
     let columns = solve_rows(&model, &[], 3, ALL, &pool, &Control::default()).unwrap().unwrap();
     assert_eq!(columns.tip.len(), 48);
     assert!(pool.current_num_threads() == 2 && tdcr::batch::pool(Some(0)).is_err());

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tdcr::linkage::{Linkage, LinkageSettings};
+use tdcr::linkage::{Linkage, LinkageSettings, Plan};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
 use tdcr::{InvalidInput, Shape, Status};
@@ -28,7 +28,8 @@ fn ending(azimuth: f64, radius: f64, end: usize) -> Tendon {
 }
 
 fn try_solve(robot: &Robot, displacements: &[f64]) -> Result<Shape, InvalidInput> {
-    Linkage::new(robot, LinkageSettings::default())?.shape(displacements)
+    let plan = Plan::new(robot)?;
+    Linkage::new(robot, &plan, LinkageSettings::default())?.shape(displacements)
 }
 
 fn solve(robot: &Robot, displacements: &[f64]) -> Shape {
@@ -399,9 +400,10 @@ fn pre_bent_backbones_and_bad_settings_are_refused() {
     let bent = Robot::new(Backbone::new(spec).unwrap(), tendons, None, None, None).unwrap();
     assert_eq!(try_solve(&bent, &[-0.001]).unwrap_err().argument, "robot.backbone.rest");
     let trunk = robot(0.2, 2, straight(&[0.0], 0.01));
+    let plan = Plan::new(&trunk).unwrap();
     for (step_tolerance, max_iterations) in [(0.0, 50), (f64::NAN, 50), (1.0, 50), (1e-9, 0)] {
         let settings = LinkageSettings { step_tolerance, max_iterations };
-        assert!(Linkage::new(&trunk, settings).is_err());
+        assert!(Linkage::new(&trunk, &plan, settings).is_err());
     }
 }
 
@@ -409,7 +411,8 @@ fn pre_bent_backbones_and_bad_settings_are_refused() {
 fn running_out_of_iterations_is_said_with_the_disk() {
     let trunk = robot(0.2, 3, straight(&[0.0, 1.0], 0.01));
     let settings = LinkageSettings { max_iterations: 1, ..LinkageSettings::default() };
-    let shape = Linkage::new(&trunk, settings).unwrap().shape(&[-0.02, -0.01]).unwrap();
+    let plan = Plan::new(&trunk).unwrap();
+    let shape = Linkage::new(&trunk, &plan, settings).unwrap().shape(&[-0.02, -0.01]).unwrap();
     assert_eq!(shape.report.status, Status::IterationLimit);
     assert!(shape.message.starts_with("failed at disk 1"), "{}", shape.message);
     assert!(shape.report.residual > 1e-9);

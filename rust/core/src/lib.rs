@@ -5,10 +5,10 @@
 //!
 //! Rooms, from the bottom up: [`lie`] (rotations and rigid motions), [`solve`] (solvers that know no
 //! robots), [`robot`] (what a robot is), [`model`] (what every forward model offers), [`linkage`]
-//! (the linkage model), [`batch`] (many solves on all cores).
+//! (the linkage model), [`constant_curvature`], [`batch`] (many solves on all cores).
 //!
 //! ```
-//! use tdcr::linkage::{Linkage, LinkageSettings};
+//! use tdcr::linkage::{Linkage, LinkageSettings, Plan};
 //! use tdcr::model::Model;
 //! use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
 //!
@@ -16,7 +16,8 @@
 //! let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
 //! let tendons = vec![Tendon::straight(0.0, 0.01)?];
 //! let robot = Robot::new(backbone, tendons, None, None, None)?;
-//! let shape = Linkage::new(&robot, LinkageSettings::default())?.shape(&[-0.01])?;
+//! let plan = Plan::new(&robot)?;
+//! let shape = Linkage::new(&robot, &plan, LinkageSettings::default())?.shape(&[-0.01])?;
 //! assert_eq!(shape.report.status, tdcr::Status::Converged);
 //! // Bent by 1 rad towards +x.
 //! assert!((shape.state.strains.iter().map(|w| w.y).sum::<f64>() - 1.0).abs() < 1e-3);

@@ -26,6 +26,17 @@ pub struct State {
 }
 
 impl State {
+    /// Rows of strains one after the other: rotation vector, and elongation where there is one.
+    pub fn write_strains(&self, place: &mut [f64]) {
+        let width = if self.elongations.is_empty() { 3 } else { 4 };
+        for (i, (row, strain)) in place.chunks_exact_mut(width).zip(&self.strains).enumerate() {
+            row[..3].copy_from_slice(strain.as_slice());
+            if width == 4 {
+                row[3] = self.elongations[i];
+            }
+        }
+    }
+
     /// Empties the buffers, keeping their memory.
     pub fn clear(&mut self) {
         self.frames.clear();
@@ -55,6 +66,11 @@ pub trait Model: Sync {
 
     /// The robot it was prepared from.
     fn robot(&self) -> &Robot;
+
+    /// Numbers per element in a row of strains: 3, or 4 with the elongation.
+    fn strain_width(&self) -> usize {
+        3
+    }
 
     /// Solves for checked displacements \[m\]; see [`Robot::check_displacements`]. A solve that does
     /// not converge is a report, with the last iterate in the state.

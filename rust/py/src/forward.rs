@@ -1,19 +1,21 @@
 //! `forward` and the engine of `forward_batch`.
 
 use numpy::PyUntypedArrayMethods;
+use pyo3::PyTypeInfo;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use tdcr::batch::{Columns, Fields, pool, solve_rows};
-use tdcr::linkage::{self, Linkage};
+use tdcr::constant_curvature::{self, ConstantCurvature, ConstantCurvatureSettings};
+use tdcr::linkage::{Linkage, LinkageSettings};
 use tdcr::model::Model;
 use tdcr::{InvalidInput, Status};
 
 use crate::convert::{float_array, frozen, invalid, status, type_name, values, wrong_shape};
 use crate::long_call;
 use crate::robot::Robot;
-use crate::settings::LinkageSettings;
+use crate::settings;
 use crate::shape::Shape;
 
 /// From tendon displacements to the shape.
@@ -25,12 +27,16 @@ use crate::shape::Shape;
 ///     Change of each tendon's length inside the robot, in the order of `robot.tendons` [m].
 ///     Negative pulls, positive releases, 0 holds the tendon at its rest length, `inf` frees it. A
 ///     tendon can only pull: its length is at most rest length plus displacement.
-/// model : {"linkage"}
+/// model : {"linkage", "constant_curvature"}
 ///     "linkage": a chain of four-bar (one tendon) or seven-bar linkages (two), the constrained
 ///     minimum of the coupler angles (Ashwin & Ghosal, "Forward kinematics of cable-driven
 ///     continuum robot using optimization method"). The two most-pulled tendons on different lines
 ///     through the centre drive; the bounds of the others are checked. Straight backbones only.
-/// settings : LinkageSettings, optional
+///     "constant_curvature": every segment an arc, by least squares over all its tendons
+///     (opencontinuumrobotics.com). Bilateral: displacements count as given, but for free tendons and
+///     the only, released one of a segment. Straight backbones and straight routing only.
+/// settings : LinkageSettings or ConstantCurvatureSettings, optional
+///     Those of the model.
 ///
 /// Returns
 /// -------
@@ -41,7 +47,8 @@ use crate::shape::Shape;
 /// ------
 /// InvalidInput
 ///     NaN, -inf, another number of displacements than tendons, a (B, K) array, an unknown model, a
-///     pre-bent backbone, two linkage tendons on one azimuth.
+///     pre-bent backbone, two linkage tendons on one azimuth, settings of another model, a routing
+///     that the model does not take.
 /// TypeError
 ///     A value of another type.
 #[pyfunction]
@@ -53,45 +60,129 @@ pub(crate) fn forward(
     model: &str,
     settings: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Shape> {
-    let settings = linkage_settings(model, settings)?;
+    let choice = Choice::new(model, settings)?;
+    let displacements = one_row(robot, displacements)?;
+    let solved = robot.get();
+    let shape = py
+        .detach(|| match choice {
+            Choice::Linkage(settings) => {
+                Linkage::new(&solved.0, solved.linkage_plan()?, settings)?.shape(&displacements)
+            }
+            Choice::ConstantCurvature(settings) => {
+                let plan = solved.constant_curvature_plan(settings)?;
+                ConstantCurvature::new(&solved.0, plan).shape(&displacements)
+            }
+        })
+        .map_err(|e| invalid(&e))?;
+    Ok(Shape::new(solved.clone(), model, displacements, shape))
+}
+
+/// Velocity of the tool point per metre of tendon displacement.
+///
+/// Parameters
+/// ----------
+/// robot : Robot
+/// displacements : array_like, shape (K,)
+///     As for `forward` [m].
+/// model : {"constant_curvature"}
+/// settings : ConstantCurvatureSettings, optional
+///
+/// Returns
+/// -------
+/// ndarray, shape (6, K)
+///     Velocity of the tool point [m/m], then angular velocity [rad/m], world axes. Exact; finite
+///     where the robot is straight. Columns of tendons that do not count (free, or the only, released
+///     one of a segment) are zero: a single tendon moves the tip when it is pulled, not when it is
+///     released.
+///
+/// Raises
+/// ------
+/// InvalidInput
+///     As `forward`, and for a model without derivatives.
+#[pyfunction]
+#[pyo3(signature = (robot, displacements, *, model, settings=None))]
+pub(crate) fn jacobian(
+    py: Python<'_>,
+    robot: &Bound<'_, Robot>,
+    displacements: &Bound<'_, PyAny>,
+    model: &str,
+    settings: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Py<PyAny>> {
+    let Choice::ConstantCurvature(settings) = Choice::new(model, settings)? else {
+        let expected = "a model with derivatives (\"constant_curvature\")";
+        return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
+    };
+    let displacements = one_row(robot, displacements)?;
+    let solved = robot.get();
+    solved.0.check_displacements(&displacements).map_err(|e| invalid(&e))?;
+    let plan = solved.constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
+    let matrix = ConstantCurvature::new(&solved.0, plan)
+        .jacobian(&displacements, &mut constant_curvature::Workspace::default());
+    // Columns of the transpose are the rows.
+    frozen(py, matrix.transpose().as_slice().to_vec(), &[6, displacements.len()])
+}
+
+/// Displacements of one solve.
+fn one_row(robot: &Bound<'_, Robot>, displacements: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let array = float_array("displacements", displacements)?;
     let tendons = robot.get().0.tendons().len();
     match array.shape() {
-        [_] => {}
+        [_] => Ok(values(&array)?.to_vec()),
         [_, _] => {
             let expected = format!("shape ({tendons},); forward_batch takes (B, {tendons})");
-            return Err(wrong_shape("displacements", &expected, array.shape()));
+            Err(wrong_shape("displacements", &expected, array.shape()))
         }
-        shape => {
-            let expected = format!("shape ({tendons},)");
-            return Err(wrong_shape("displacements", &expected, shape));
-        }
+        shape => Err(wrong_shape("displacements", &format!("shape ({tendons},)"), shape)),
     }
-    let displacements = values(&array)?.to_vec();
-    let core = &robot.get().0;
-    let shape = py
-        .detach(|| Linkage::new(core, settings)?.shape(&displacements))
-        .map_err(|e| invalid(&e))?;
-    Ok(Shape::new(robot.get().clone(), model, displacements, shape))
 }
 
-/// The settings of a model, after checking its name and their type.
-fn linkage_settings(
-    model: &str,
-    settings: Option<&Bound<'_, PyAny>>,
-) -> PyResult<linkage::LinkageSettings> {
-    if model != "linkage" {
-        let got = format!("\"{model}\"");
-        return Err(invalid(&InvalidInput::new("model", "\"linkage\"", got)));
+/// A model by name with its settings.
+#[derive(Clone, Copy)]
+enum Choice {
+    Linkage(LinkageSettings),
+    ConstantCurvature(ConstantCurvatureSettings),
+}
+
+impl Choice {
+    /// Checks the name, and that the settings are those of this model.
+    fn new(model: &str, settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        match model {
+            "linkage" => {
+                let given = own_settings::<settings::LinkageSettings>(model, settings)?;
+                Ok(Self::Linkage(given.map_or_else(Default::default, |s| s.get().0)))
+            }
+            "constant_curvature" => {
+                let given = own_settings::<settings::ConstantCurvatureSettings>(model, settings)?;
+                Ok(Self::ConstantCurvature(given.map_or_else(Default::default, |s| s.get().0)))
+            }
+            _ => {
+                let expected = "\"linkage\" or \"constant_curvature\"";
+                let got = format!("\"{model}\"");
+                Err(invalid(&InvalidInput::new("model", expected, got)))
+            }
+        }
     }
-    let Some(settings) = settings else { return Ok(linkage::LinkageSettings::default()) };
-    let settings = settings.cast::<LinkageSettings>().map_err(|_| {
-        let got = type_name(settings);
-        PyTypeError::new_err(format!(
-            "settings: expected LinkageSettings for \"{model}\", got {got}"
-        ))
-    })?;
-    Ok(settings.get().0)
+}
+
+/// Settings of the right class, or none: those of another model are `InvalidInput`, anything else is a
+/// `TypeError`.
+fn own_settings<'a, 'py, T: PyTypeInfo>(
+    model: &str,
+    settings: Option<&'a Bound<'py, PyAny>>,
+) -> PyResult<Option<&'a Bound<'py, T>>> {
+    let Some(settings) = settings else { return Ok(None) };
+    settings.cast::<T>().map(Some).map_err(|_| {
+        let expected = T::type_object(settings.py()).name().map(|name| name.to_string());
+        let (expected, got) = (expected.unwrap_or_default(), type_name(settings));
+        let known = settings.is_instance_of::<settings::LinkageSettings>()
+            || settings.is_instance_of::<settings::ConstantCurvatureSettings>();
+        if known {
+            let expected = format!("{expected} for model \"{model}\"");
+            return invalid(&InvalidInput::new("settings", expected, got));
+        }
+        let message = format!("settings: expected {expected} for model \"{model}\", got {got}");
+        PyTypeError::new_err(message)
+    })
 }
 
 /// Columns of a batch by field name; `tdcr.forward_batch` is the face of it.
@@ -108,7 +199,7 @@ pub(crate) fn _forward_batch<'py>(
     threads: Option<i64>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let settings = linkage_settings(model, settings)?;
+    let choice = Choice::new(model, settings)?;
     let core = &robot.get().0;
     let tendons = core.tendons().len();
     let array = float_array("displacements", displacements)?;
@@ -131,11 +222,23 @@ pub(crate) fn _forward_batch<'py>(
         energy: fields.iter().any(|f| f == "energy"),
     };
     let pool = pool(threads.map(crate::convert::count)).map_err(|e| invalid(&e))?;
-    let model = Linkage::new(core, settings).map_err(|e| invalid(&e))?;
     let flat = values(&array)?;
-    let solved = long_call::run(py, progress, |control| {
-        solve_rows(&model, flat, rows, wanted, &pool, control)
-    })?;
+    let solved = match choice {
+        Choice::Linkage(settings) => {
+            let plan = robot.get().linkage_plan().map_err(|e| invalid(&e))?;
+            let model = Linkage::new(core, plan, settings).map_err(|e| invalid(&e))?;
+            long_call::run(py, progress, |control| {
+                solve_rows(&model, flat, rows, wanted, &pool, control)
+            })?
+        }
+        Choice::ConstantCurvature(settings) => {
+            let plan = robot.get().constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
+            let model = ConstantCurvature::new(core, plan);
+            long_call::run(py, progress, |control| {
+                solve_rows(&model, flat, rows, wanted, &pool, control)
+            })?
+        }
+    };
     // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
     let solved = solved.map_err(|e| invalid(&e))?.unwrap_or_default();
     export(py, robot, wanted, solved)
@@ -160,7 +263,8 @@ fn export<'py>(
     put(wanted.tip, "tip", solved.tip, &[rows, 4, 4])?;
     put(wanted.frames, "frames", solved.frames, &[rows, n + 1, 4, 4])?;
     put(wanted.positions, "positions", solved.positions, &[rows, n + 1, 3])?;
-    put(wanted.strains, "strains", solved.strains, &[rows, n, 3])?;
+    let width = solved.strains.len().checked_div(rows * n).unwrap_or(3);
+    put(wanted.strains, "strains", solved.strains, &[rows, n, width])?;
     put(wanted.tendon_lengths, "tendon_lengths", solved.tendon_lengths, &[rows, tendons])?;
     put(wanted.tensions, "tensions", solved.tensions, &[rows, tendons])?;
     put(wanted.energy, "energy", solved.energy, &[rows])?;

@@ -8,6 +8,7 @@
 #![allow(clippy::needless_pass_by_value, clippy::unused_self)]
 
 mod backbone;
+mod constant_curvature;
 mod convert;
 mod forward;
 mod long_call;
@@ -24,11 +25,15 @@ mod _core {
     #[pymodule_export]
     use crate::backbone::Backbone;
     #[pymodule_export]
-    use crate::forward::{_forward_batch, forward};
+    use crate::constant_curvature::{
+        _arc_frames, _arc_from_displacements, _arc_jacobian, _displacements_from_arc,
+    };
+    #[pymodule_export]
+    use crate::forward::{_forward_batch, forward, jacobian};
     #[pymodule_export]
     use crate::robot::Robot;
     #[pymodule_export]
-    use crate::settings::{_rust_defaults, LinkageSettings};
+    use crate::settings::{_rust_defaults, ConstantCurvatureSettings, LinkageSettings};
     #[pymodule_export]
     use crate::shape::{_rotation_vector, _shape, Shape};
     #[pymodule_export]

@@ -1,11 +1,13 @@
 //! `Robot`.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple, PyType};
 
+use tdcr::constant_curvature::{self, ConstantCurvatureSettings};
 use tdcr::robot as core;
+use tdcr::{InvalidInput, linkage};
 
 use crate::backbone::Backbone;
 use crate::convert::{Lazy, frozen, frozen_frames, invalid, matrix4};
@@ -35,15 +37,37 @@ use crate::tendon::Tendon;
 ///     A value of another type.
 #[pyclass(frozen, eq, hash, module = "tdcr")]
 #[derive(Clone)]
-pub(crate) struct Robot(pub(crate) Arc<core::Robot>, Arc<Arrays>);
+pub(crate) struct Robot(pub(crate) Arc<core::Robot>, Arc<Kept>);
 
-/// Arrays that are built on first access.
+/// What is built on first use and kept with the robot.
 #[derive(Default)]
-struct Arrays {
+struct Kept {
+    linkage: OnceLock<Result<linkage::Plan, InvalidInput>>,
+    /// One per settings; see [`Robot::constant_curvature_plan`].
+    constant_curvature: [OnceLock<Result<constant_curvature::Plan, InvalidInput>>; 4],
     base: Lazy,
     tool: Lazy,
     rest_lengths: Lazy,
     rest_frames: Lazy,
+}
+
+impl Robot {
+    /// The plan of the linkage model, made on first use.
+    pub(crate) fn linkage_plan(&self) -> Result<&linkage::Plan, InvalidInput> {
+        let plan = self.1.linkage.get_or_init(|| linkage::Plan::new(&self.0));
+        plan.as_ref().map_err(InvalidInput::clone)
+    }
+
+    /// The plan of the constant-curvature model, made on first use.
+    pub(crate) fn constant_curvature_plan(
+        &self,
+        settings: ConstantCurvatureSettings,
+    ) -> Result<&constant_curvature::Plan, InvalidInput> {
+        let place = 2 * settings.coupling as usize + usize::from(settings.extensible);
+        let plan = self.1.constant_curvature[place]
+            .get_or_init(|| constant_curvature::Plan::new(&self.0, settings));
+        plan.as_ref().map_err(InvalidInput::clone)
+    }
 }
 
 impl PartialEq for Robot {

@@ -3,6 +3,8 @@
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
+use tdcr::InvalidInput;
+use tdcr::constant_curvature as cc;
 use tdcr::linkage;
 
 use crate::convert::{count, invalid};
@@ -70,6 +72,71 @@ impl LinkageSettings {
     }
 }
 
+/// Choices of the constant-curvature model.
+///
+/// Parameters
+/// ----------
+/// coupling : {"coupled", "per_segment"}, optional
+///     "coupled": displacements are measured at the base, and a tendon is shortened in every segment
+///     it runs through. "per_segment": each displacement is the part inside the segment where the
+///     tendon ends.
+/// extensible : bool, optional
+///     Whether the length of every segment is an unknown too. At least three tendons must end at
+///     each segment that has any.
+///
+/// Raises
+/// ------
+/// InvalidInput
+///     Another coupling.
+#[pyclass(frozen, eq, hash, module = "tdcr")]
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub(crate) struct ConstantCurvatureSettings(pub(crate) cc::ConstantCurvatureSettings);
+
+#[pymethods]
+impl ConstantCurvatureSettings {
+    #[new]
+    #[pyo3(signature = (*, coupling="coupled", extensible=false))]
+    fn new(coupling: &str, extensible: bool) -> PyResult<Self> {
+        let known = cc::Coupling::ALL.into_iter().find(|known| known.as_str() == coupling);
+        let Some(coupling) = known else {
+            let expected = "\"coupled\" or \"per_segment\"";
+            let got = format!("\"{coupling}\"");
+            return Err(invalid(&InvalidInput::new("coupling", expected, got)));
+        };
+        Ok(Self(cc::ConstantCurvatureSettings { coupling, extensible }))
+    }
+
+    /// How displacements reach the segments: "coupled" or "per_segment".
+    #[getter]
+    fn coupling(&self) -> &'static str {
+        self.0.coupling.as_str()
+    }
+
+    /// Whether the length of every segment is an unknown too.
+    #[getter]
+    fn extensible(&self) -> bool {
+        self.0.extensible
+    }
+
+    fn __repr__(&self) -> String {
+        let extensible = if self.0.extensible { "True" } else { "False" };
+        format!(
+            "ConstantCurvatureSettings(coupling={:?}, extensible={extensible})",
+            self.coupling()
+        )
+    }
+
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        let keywords = PyDict::new(py);
+        keywords.set_item("coupling", self.coupling())?;
+        keywords.set_item("extensible", self.extensible())?;
+        Ok((PyTuple::empty(py), keywords))
+    }
+}
+
 /// Defaults of the core's settings by class name, for the test that compares them with Python's.
 #[pyfunction]
 pub(crate) fn _rust_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
@@ -79,5 +146,10 @@ pub(crate) fn _rust_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     values.set_item("max_iterations", linkage.max_iterations)?;
     let defaults = PyDict::new(py);
     defaults.set_item("LinkageSettings", values)?;
+    let curvature = cc::ConstantCurvatureSettings::default();
+    let values = PyDict::new(py);
+    values.set_item("coupling", curvature.coupling.as_str())?;
+    values.set_item("extensible", curvature.extensible)?;
+    defaults.set_item("ConstantCurvatureSettings", values)?;
     Ok(defaults)
 }

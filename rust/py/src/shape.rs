@@ -61,6 +61,7 @@ impl PartialEq for Shape {
             && same_bits(&self.displacements, &other.displacements)
             && a.state.frames == b.state.frames
             && a.state.strains == b.state.strains
+            && same_bits(&a.state.elongations, &b.state.elongations)
             && same_bits(&a.state.tensions, &b.state.tensions)
             && a.report.status == b.report.status
     }
@@ -112,10 +113,17 @@ impl Shape {
     }
 
     /// Rotation vector of every element in the frame of its own base (bending about x and y,
-    /// torsion), shape (n, 3) [rad].
+    /// torsion), shape (n, 3) [rad]; with the relative elongation as a fourth column in extensible
+    /// models.
     #[getter]
     fn strains(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let build = || frozen_points(py, self.core.state.strains.iter().copied());
+        let build = || {
+            let state = &self.core.state;
+            let width = if state.elongations.is_empty() { 3 } else { 4 };
+            let mut flat = vec![0.0; width * state.strains.len()];
+            state.write_strains(&mut flat);
+            frozen(py, flat, &[state.strains.len(), width])
+        };
         self.arrays.strains.get(py, build)
     }
 
@@ -141,7 +149,7 @@ impl Shape {
     }
 
     /// Tension of every tendon, shape (K,) [N, or 1/m^2 when `units` is "EI"]. NaN in the linkage
-    /// model, which knows no forces.
+    /// and the constant-curvature model, which know no forces.
     #[getter]
     fn tensions(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let tensions = &self.core.state.tensions;
@@ -317,9 +325,16 @@ pub(crate) fn _shape(
             translation: Vector3::new(m[3], m[7], m[11]),
         })
         .collect();
+    let strains = float_array("strains", strains)?;
+    let width = match strains.shape() {
+        [_, width @ (3 | 4)] => *width,
+        shape => return Err(crate::convert::wrong_shape("strains", "shape (n, 3 or 4)", shape)),
+    };
+    let rows = values(&strains)?.chunks_exact(width);
     let state = State {
         frames,
-        strains: crate::convert::vectors("strains", strains)?,
+        strains: rows.clone().map(|row| Vector3::new(row[0], row[1], row[2])).collect(),
+        elongations: if width == 4 { rows.map(|row| row[3]).collect() } else { Vec::new() },
         tendon_lengths: list("tendon_lengths", tendon_lengths)?,
         tensions: list("tensions", tensions)?,
         energy,

@@ -90,7 +90,7 @@ pub struct Columns {
     pub frames: Vec<f64>,
     /// (B, n + 1, 3) \[m\].
     pub positions: Vec<f64>,
-    /// (B, elements, 3) \[rad\].
+    /// (B, elements, 3 or 4) \[rad, and relative elongation\].
     pub strains: Vec<f64>,
     /// Per tendon (B, end + 1, 3) \[m\].
     pub tendon_points: Vec<Vec<f64>>,
@@ -138,7 +138,7 @@ pub fn solve_rows<M: Model>(
     }
     let blank = Report { status: Status::NumericalError, residual: f64::NAN, iterations: 0 };
     let mut reports = vec![blank; rows];
-    let mut columns = allocate(robot, fields, rows)?;
+    let mut columns = allocate(model, fields, rows)?;
     let failed = {
         let mut pieces: Vec<Pieces<'_>> =
             columns.iter_mut().map(|column| column.pieces(ROWS_PER_JOB)).collect();
@@ -197,14 +197,15 @@ fn run<M: Model>(
 }
 
 /// Columns in the order of [`write_row`]: seven fields, then the points of each tendon.
-fn allocate(robot: &Robot, wanted: Fields, rows: usize) -> Result<Vec<Column>, InvalidInput> {
+fn allocate<M: Model>(model: &M, wanted: Fields, rows: usize) -> Result<Vec<Column>, InvalidInput> {
+    let robot = model.robot();
     let n = robot.backbone().subsegments();
     let tendons = robot.tendons().len();
     let widths = [
         (wanted.tip, 16),
         (wanted.frames, 16 * (n + 1)),
         (wanted.positions, 3 * (n + 1)),
-        (wanted.strains, 3 * n),
+        (wanted.strains, model.strain_width() * n),
         (wanted.tendon_lengths, tendons),
         (wanted.tensions, tendons),
         (wanted.energy, 1),
@@ -230,7 +231,7 @@ fn write_row(kind: usize, place: &mut [f64], robot: &Robot, state: &State) {
             }
         }
         2 => write_points(place, state.frames.iter().map(|frame| frame.translation)),
-        3 => write_points(place, state.strains.iter().copied()),
+        3 => state.write_strains(place),
         4 => place.copy_from_slice(&state.tendon_lengths),
         5 => place.copy_from_slice(&state.tensions),
         6 => place.fill(state.energy),

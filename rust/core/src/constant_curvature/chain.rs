@@ -313,6 +313,10 @@ impl Model for ConstantCurvature<'_> {
         self.robot
     }
 
+    fn strain_width(&self) -> usize {
+        if self.plan.settings.extensible { 4 } else { 3 }
+    }
+
     fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
         let sound = self.fit(displacements, work);
         self.place(displacements, work);

@@ -13,14 +13,40 @@ use crate::robot::{Path, Robot};
 use crate::solve::sqp::{Ending, Settings};
 use crate::status::Status;
 
-/// A robot prepared for the linkage model: everything that does not depend on the displacements.
+/// What the linkage model knows of a robot before any displacement: worth keeping between solves.
 #[derive(Clone, Debug)]
-pub struct Linkage<'r> {
-    pub(super) robot: &'r Robot,
-    settings: LinkageSettings,
+pub struct Plan {
     pub(super) runs: Vec<Run>,
     /// Pieces of every tendon, scaled to unit subsegments.
     pieces: Vec<Vec<Hole>>,
+}
+
+impl Plan {
+    /// Prepares a robot.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a backbone that is bent at rest: the linkages are those of a straight one.
+    pub fn new(robot: &Robot) -> Result<Self, InvalidInput> {
+        if !robot.backbone().is_straight() {
+            let expected = "a backbone that is straight at rest for model \"linkage\"";
+            return Err(InvalidInput::new("robot.backbone.rest", expected, "a pre-bent one"));
+        }
+        let lengths = robot.backbone().lengths();
+        let pieces = (robot.paths().iter())
+            .map(|path| {
+                path.holes.windows(2).zip(lengths).map(|(pair, l)| piece(pair, *l)).collect()
+            })
+            .collect();
+        Ok(Self { runs: runs(robot), pieces })
+    }
+}
+
+/// The linkage model of a robot, ready to solve.
+#[derive(Clone, Copy, Debug)]
+pub struct Linkage<'r> {
+    pub(super) robot: &'r Robot,
+    pub(super) plan: &'r Plan,
+    settings: LinkageSettings,
 }
 
 /// Buffers of a solve, reused from one to the next.
@@ -46,24 +72,17 @@ pub(super) enum Failure {
 const BOUND_TOLERANCE: f64 = 1e-9;
 
 impl<'r> Linkage<'r> {
-    /// Prepares a robot.
+    /// Solves with a plan that was made of this robot.
     ///
     /// # Errors
-    /// `InvalidInput` for settings out of range, or a backbone that is bent at rest: the linkages
-    /// are those of a straight one.
-    pub fn new(robot: &'r Robot, settings: LinkageSettings) -> Result<Self, InvalidInput> {
+    /// `InvalidInput` for settings out of range.
+    pub fn new(
+        robot: &'r Robot,
+        plan: &'r Plan,
+        settings: LinkageSettings,
+    ) -> Result<Self, InvalidInput> {
         settings.validate()?;
-        if !robot.backbone().is_straight() {
-            let expected = "a backbone that is straight at rest for model \"linkage\"";
-            return Err(InvalidInput::new("robot.backbone.rest", expected, "a pre-bent one"));
-        }
-        let lengths = robot.backbone().lengths();
-        let pieces = (robot.paths().iter())
-            .map(|path| {
-                path.holes.windows(2).zip(lengths).map(|(pair, l)| piece(pair, *l)).collect()
-            })
-            .collect();
-        Ok(Self { robot, settings, runs: runs(robot), pieces })
+        Ok(Self { robot, plan, settings })
     }
 
     fn chain(&self, displacements: &[f64], work: &mut Workspace, report: &mut Report) {
@@ -77,7 +96,7 @@ impl<'r> Linkage<'r> {
         state.frames.reserve(lengths.len() + 1);
         state.strains.reserve(lengths.len());
         state.frames.push(frame);
-        for (index, run) in self.runs.iter().enumerate() {
+        for (index, run) in self.plan.runs.iter().enumerate() {
             for i in run.first..run.last {
                 let question = self.question(drives[index], i, displacements);
                 // Alike subsegments under alike pulls are one problem: it is solved once.
@@ -107,7 +126,7 @@ impl<'r> Linkage<'r> {
 
     fn question(&self, drive: Drive, subsegment: usize, displacements: &[f64]) -> Question {
         let hole = |k: usize| {
-            let piece = self.pieces[k][subsegment];
+            let piece = self.plan.pieces[k][subsegment];
             let share = -displacements[k] / self.robot.paths()[k].rest_length;
             Hole { pull: share * piece.rest, ..piece }
         };
@@ -150,9 +169,9 @@ impl Model for Linkage<'_> {
     }
 
     fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
-        let choice = Choice { robot: self.robot, pieces: &self.pieces, displacements };
+        let choice = Choice { robot: self.robot, pieces: &self.plan.pieces, displacements };
         work.drives.clear();
-        for run in &self.runs {
+        for run in &self.plan.runs {
             work.drives.push(choice.of(run)?);
         }
         let mut report = Report { status: Status::Converged, residual: 0.0, iterations: 0 };

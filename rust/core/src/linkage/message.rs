@@ -43,7 +43,7 @@ impl Linkage<'_> {
 
     /// The smallest number of subsegments that takes the pull: more than `|(C, S)| / 2`.
     fn too_few(&self, disk: usize, run: usize, half: f64) -> String {
-        let Run { first, last, .. } = self.runs[run];
+        let Run { first, last, .. } = self.plan.runs[run];
         let arcs = self.robot.backbone().arc_lengths();
         let needed = half * (arcs[last] - arcs[first]) / (arcs[disk] - arcs[disk - 1]);
         format!(

@@ -14,7 +14,7 @@ mod pose;
 pub mod seven_bar;
 mod subsegment;
 
-pub use chain::{Linkage, Workspace};
+pub use chain::{Linkage, Plan, Workspace};
 pub use pose::Pose;
 pub use subsegment::{solve_four_bar, solve_seven_bar};
 
