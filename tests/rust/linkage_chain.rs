@@ -53,8 +53,8 @@ fn polygon(length: f64, n: usize, beta: f64, azimuth: f64, k: usize) -> Vector3<
 fn chains_meet_the_closed_form() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut u = move |low: f64, high: f64| rng.random_range(low..high);
-    let mut worst = 0.0_f64;
-    for case in 0..600 {
+    let (mut worst, mut solved) = (0.0_f64, 0);
+    for case in 0..3000 {
         let (length, radius) = (u(0.05, 2.0), u(0.003, 0.03));
         let azimuth = u(-PI, PI);
         let (second, towards) = (azimuth + u(0.3, 2.8), u(0.0, TAU));
@@ -70,14 +70,15 @@ fn chains_meet_the_closed_form() {
         let trunk = robot(length, n, straight(&[azimuth, second], radius));
         let shape = solve(&trunk, &[-pulls[0], -pulls[1]]);
         assert_eq!(shape.report.status, Status::Converged, "{}", shape.message);
+        solved += 1;
         let beta = 2.0 * (0.5 * total / n as f64).asin();
         for (k, frame) in shape.state.frames.iter().enumerate() {
             let error = (frame.translation - polygon(length, n, beta, towards, k)).amax() / length;
             worst = worst.max(error);
         }
     }
-    println!("worst position error: {worst:.1e} of the length");
-    assert!(worst > 0.0 && worst < 1e-12, "{worst:e}");
+    println!("worst position error of {solved} chains: {worst:.1e} of the length");
+    assert!(solved > 500 && worst < 1e-12, "{solved} {worst:e}");
 }
 
 #[test]
@@ -415,81 +416,69 @@ fn running_out_of_iterations_is_said_with_the_disk() {
     let shape = Linkage::new(&trunk, &plan, settings).unwrap().shape(&[-0.02, -0.01]).unwrap();
     assert_eq!(shape.report.status, Status::IterationLimit);
     assert!(shape.message.starts_with("failed at disk 1"), "{}", shape.message);
-    assert!(shape.report.residual > 1e-9);
 }
 
-/// Any robot, any pull: an answer within the budget, finite, and never called converged when a tendon
-/// is longer than it may be or a link is not as long as it is.
+/// At and around pulls of exactly 2 a n the count named is never the one there is.
 #[test]
-fn random_robots_are_solved_or_honestly_flagged() {
-    let mut rng = ChaCha8Rng::seed_from_u64(21);
-    let mut u = move |low: f64, high: f64| rng.random_range(low..high);
-    let (mut gentle, mut gentle_solved, mut refused) = (0, 0, 0);
-    for case in 0..3000 {
-        let n = u(1.0, 40.0) as usize;
-        let length = u(0.05, 0.5);
-        let count = u(1.0, 5.0) as usize;
-        let tendons: Vec<Tendon> = (0..count)
-            .map(|_| {
-                let end = u(1.0, n as f64 + 1.0) as usize;
-                let (azimuth, radius) = (u(-PI, PI), u(0.004, 0.012));
-                let routing = match u(0.0, 4.0) as usize {
-                    0 => Routing::Helical {
-                        azimuth,
-                        radius,
-                        turns: u(-1.0, 1.0) * end as f64 / 40.0,
-                    },
-                    1 => Routing::Holes {
-                        indices: (0..=end).map(|i| (i / 5) % 12).collect(),
-                        count: 12,
-                        radius: PerDisk::Same(radius),
-                        azimuth,
-                    },
-                    2 => Routing::Angles {
-                        azimuth: PerDisk::Same(azimuth),
-                        radius: PerDisk::Each((0..=end).map(|_| u(0.8, 1.2) * radius).collect()),
-                    },
-                    _ => Routing::Angles {
-                        azimuth: PerDisk::Same(azimuth),
-                        radius: PerDisk::Same(radius),
-                    },
-                };
-                Tendon::new(routing, Some(end), None, None).unwrap()
-            })
-            .collect();
-        let trunk = robot(length, n, tendons);
-        // Two in three: one tendon pulled gently, the rest free. Else: anything.
-        let mild = case % 3 != 0;
-        let displacements: Vec<f64> = (0..count)
-            .map(|k| match (mild, k) {
-                (true, 0) => -u(0.0, 0.02) * trunk.paths()[0].rest_length,
-                (true, _) => FREE,
-                (false, _) => u(-0.3, 0.3) * length,
-            })
-            .collect();
-        let Ok(shape) = try_solve(&trunk, &displacements) else {
-            refused += 1;
-            continue;
-        };
-        assert!(shape.state.frames.iter().all(|f| f.translation.iter().all(|x| x.is_finite())));
-        assert_eq!(shape.message.is_empty(), shape.report.status == Status::Converged);
-        if mild {
-            gentle += 1;
-            gentle_solved += usize::from(shape.report.status == Status::Converged);
-        }
-        if shape.report.status != Status::Converged {
-            continue;
-        }
-        for (k, path) in trunk.paths().iter().enumerate() {
-            let slack = path.rest_length + displacements[k] - shape.state.tendon_lengths[k];
-            assert!(slack > -1e-9 * path.rest_length, "{case} {k} {slack:e}");
-        }
-        for (pair, rest) in shape.state.frames.windows(2).zip(trunk.backbone().lengths()) {
-            let link = (pair[1].translation - pair[0].translation).norm();
-            assert!((link / rest - 1.0).abs() < 1e-11);
+fn the_count_named_at_the_bound_is_not_the_one_there_is() {
+    for n in 1..200 {
+        for change in [1.0, 1.0 - 1e-15, 1.0 + 1e-15, 1.0 + 1e-9] {
+            let trunk = robot(10.0, n, straight(&[0.7], 0.01));
+            let shape = solve(&trunk, &[-0.02 * n as f64 * change]);
+            assert_eq!(shape.report.status, Status::Infeasible);
+            assert!(
+                shape.message.contains(&format!("at least {} sub", n + 1)),
+                "{}",
+                shape.message
+            );
+            assert!(shape.report.residual.is_finite());
         }
     }
-    println!("gentle pulls solved: {gentle_solved} of {gentle}; refused: {refused}");
-    assert_eq!(gentle_solved, gentle);
-    assert!(refused < 10);
+    // Azimuths a full turn apart are one azimuth, also here.
+    let turns: Vec<f64> = (0..=20).map(|i| TAU * f64::from(i)).collect();
+    let routing = Routing::Angles { azimuth: PerDisk::Each(turns), radius: PerDisk::Same(0.01) };
+    let tendon = Tendon::new(routing, None, None, None).unwrap();
+    let shape = solve(&robot(10.0, 20, vec![tendon]), &[-0.41]);
+    assert!(shape.message.contains("at least 21 subsegments"), "{}", shape.message);
+    // No number of subsegments helps where the pull is longer than the tendon.
+    let shape = solve(&robot(0.2, 20, straight(&[0.0], 0.01)), &[-0.4]);
+    assert!(shape.message.contains("no length is left"), "{}", shape.message);
+}
+
+/// Of several held tendons the one that asks for most sideways bend joins, not the most stretched.
+#[test]
+fn the_held_tendon_that_asks_for_most_bend_joins() {
+    let degrees = |d: f64| d.to_radians();
+    let trunk = robot(0.2, 20, straight(&[0.0, degrees(170.0), degrees(100.0)], 0.01));
+    let given = [-0.01, 0.008_848, 0.0];
+    let shape = solve(&trunk, &given);
+    assert_eq!(shape.report.status, Status::Converged, "{}", shape.message);
+    for (k, bound) in given.iter().enumerate() {
+        assert!(shape.state.tendon_lengths[k] < 0.2 + bound + 1e-9 * 0.2);
+    }
+}
+
+/// Both pulled lengths hold, as in the paper, also where one would have to push: it is said.
+#[test]
+fn a_pulled_tendon_that_would_have_to_push_is_named() {
+    let trunk = robot(0.2, 20, straight(&[0.0, PI / 3.0], 0.01));
+    let shape = solve(&trunk, &[-0.01, -0.001]);
+    assert_eq!(shape.report.status, Status::Converged);
+    assert!((shape.state.tendon_lengths[1] - 0.199).abs() < 1e-14);
+    assert!(shape.message.starts_with("'t1' is kept at its length and would have to push"));
+    for fine in [[-0.01, -0.006], [-0.01, FREE], [-0.01, 0.0]] {
+        assert!(solve(&trunk, &fine).message.is_empty());
+    }
+}
+
+#[test]
+fn sizes_at_the_limits_keep_their_digits() {
+    for (length, radius, pull) in [(1e15, 1e14, 1e13), (1e-15, 1e-15, 1e-17), (1e15, 1e-15, 1e-17)]
+    {
+        let shape = solve(&robot(length, 30, straight(&[0.0, 1.0], radius)), &[-pull, -0.9 * pull]);
+        assert_eq!(shape.report.status, Status::Converged, "{length:e} {}", shape.message);
+        let c = pull / radius / 30.0;
+        let strain = shape.state.strains[0];
+        assert!((strain.y / c - 1.0).abs() < 1e-2 * (1.0 + c), "{length:e} {strain}");
+    }
 }

@@ -12,6 +12,7 @@ mod constant_curvature;
 mod lie;
 mod linkage_bars;
 mod linkage_chain;
+mod linkage_random;
 mod robot;
 
 /// Every file beside this one is a module of this target: a forgotten one would never run.

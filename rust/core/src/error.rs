@@ -44,6 +44,19 @@ pub(crate) fn finite(argument: &str, unit: &str, value: f64) -> Result<f64, Inva
     }
 }
 
+/// A length that a robot can have: squares of lengths and their ratios neither overflow nor vanish.
+///
+/// # Errors
+/// `InvalidInput` when it is not.
+pub(crate) fn length(argument: &str, value: f64) -> Result<f64, InvalidInput> {
+    positive(argument, "m", value)?;
+    if (1e-15..=1e15).contains(&value) {
+        Ok(value)
+    } else {
+        Err(InvalidInput::new(argument, "a length from 1e-15 to 1e15 m", value))
+    }
+}
+
 /// A finite number above zero.
 ///
 /// # Errors

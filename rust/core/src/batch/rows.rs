@@ -53,10 +53,7 @@ impl Column {
         let width = if wanted { width } else { 0 };
         let mut values = Vec::new();
         let size = rows.saturating_mul(width);
-        values.try_reserve_exact(size).map_err(|_| {
-            let got = format!("{rows} rows of {width} numbers for one field");
-            InvalidInput::new("displacements", "rows whose fields fit into memory", got)
-        })?;
+        values.try_reserve_exact(size).map_err(|_| too_large(rows, width))?;
         values.resize(size, 0.0);
         Ok(Self { width, values })
     }
@@ -65,6 +62,11 @@ impl Column {
     fn pieces(&mut self, rows: usize) -> Pieces<'_> {
         Pieces { rest: &mut self.values, size: rows * self.width }
     }
+}
+
+fn too_large(rows: usize, width: usize) -> InvalidInput {
+    let got = format!("{rows} rows of {width} numbers for one field");
+    InvalidInput::new("displacements", "rows whose fields fit into memory", got)
 }
 
 struct Pieces<'a> {
@@ -131,13 +133,15 @@ pub fn solve_rows<M: Model>(
 ) -> Result<Option<Columns>, InvalidInput> {
     let robot = model.robot();
     let tendons = robot.tendons().len();
+    let mut reports = Vec::new();
+    reports.try_reserve_exact(rows).map_err(|_| too_large(rows, 1))?;
     for row in 0..rows {
         robot
             .check_displacements(&displacements[row * tendons..(row + 1) * tendons])
             .map_err(|error| in_row(error, row))?;
     }
     let blank = Report { status: Status::NumericalError, residual: f64::NAN, iterations: 0 };
-    let mut reports = vec![blank; rows];
+    reports.resize(rows, blank);
     let mut columns = allocate(model, fields, rows)?;
     let failed = {
         let mut pieces: Vec<Pieces<'_>> =

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::LinkageSettings;
-use super::drive::{Choice, Drive, Run, runs};
+use super::drive::{BOUND_TOLERANCE, Choice, Drive, Run, runs};
 use super::seven_bar::Hole;
 use super::subsegment::{Answer, Obstacle, Question};
 use crate::error::InvalidInput;
@@ -68,9 +68,6 @@ pub(super) enum Failure {
     Bound,
 }
 
-/// Share of a tendon's rest length by which it may exceed its bound.
-const BOUND_TOLERANCE: f64 = 1e-9;
-
 impl<'r> Linkage<'r> {
     /// Solves with a plan that was made of this robot.
     ///
@@ -83,6 +80,11 @@ impl<'r> Linkage<'r> {
     ) -> Result<Self, InvalidInput> {
         settings.validate()?;
         Ok(Self { robot, plan, settings })
+    }
+
+    /// The choice of tendons for these displacements.
+    pub(super) fn choice<'a>(&'a self, displacements: &'a [f64]) -> Choice<'a> {
+        Choice { robot: self.robot, pieces: &self.plan.pieces, displacements }
     }
 
     fn chain(&self, displacements: &[f64], work: &mut Workspace, report: &mut Report) {
@@ -135,7 +137,7 @@ impl<'r> Linkage<'r> {
             Drive::One(k) => {
                 let hole = hole(k);
                 let azimuths = &self.robot.paths()[k].azimuths;
-                if azimuths[subsegment] == azimuths[subsegment + 1] {
+                if hole.is_alike() || azimuths[subsegment] == azimuths[subsegment + 1] {
                     return Question::Planar(hole);
                 }
                 let quarter = |h: Vector3<f64>| Vector3::new(-h.y, h.x, 0.0);
@@ -150,13 +152,26 @@ impl<'r> Linkage<'r> {
     pub(super) fn overlong<'a>(
         &'a self,
         displacements: &'a [f64],
+        drives: &'a [Drive],
         state: &'a State,
     ) -> impl Iterator<Item = usize> + 'a {
+        // Those that drive on their whole way meet their length as a constraint, to the solver's
+        // tolerance.
+        let drives = move |k: usize, end: usize| {
+            let way = self.plan.runs.iter().zip(drives).take_while(|(run, _)| run.last <= end);
+            way.into_iter().all(|(_, drive)| match drive {
+                Drive::None => false,
+                Drive::One(a) => *a == k,
+                Drive::Two(a, b) => *a == k || *b == k,
+            })
+        };
         let bound = move |k: usize, path: &Path| {
             path.rest_length * (1.0 + BOUND_TOLERANCE) + displacements[k]
         };
         (self.robot.paths().iter().enumerate())
-            .filter(move |(k, path)| state.tendon_lengths[*k] > bound(*k, path))
+            .filter(move |(k, path)| {
+                !drives(*k, path.end()) && state.tendon_lengths[*k] > bound(*k, path)
+            })
             .map(|(k, _)| k)
     }
 }
@@ -169,7 +184,7 @@ impl Model for Linkage<'_> {
     }
 
     fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
-        let choice = Choice { robot: self.robot, pieces: &self.plan.pieces, displacements };
+        let choice = self.choice(displacements);
         work.drives.clear();
         for run in &self.plan.runs {
             work.drives.push(choice.of(run)?);
@@ -182,7 +197,14 @@ impl Model for Linkage<'_> {
         state.tensions.resize(displacements.len(), f64::NAN);
         state.energy =
             state.strains.iter().enumerate().map(|(i, w)| backbone.strain_energy(i, w)).sum();
-        if work.failure.is_none() && self.overlong(displacements, &work.state).next().is_some() {
+        let finite = |pose: &Pose| pose.translation.iter().all(|x| x.is_finite());
+        if work.failure.is_none() && !work.state.frames.iter().all(finite) {
+            report.status = Status::NumericalError;
+            work.failure = Some(Failure::Solve { disk: 1, ending: Ending::NumericalError });
+        }
+        if work.failure.is_none()
+            && self.overlong(displacements, &work.drives, &work.state).next().is_some()
+        {
             report.status = Status::Infeasible;
             work.failure = Some(Failure::Bound);
         }

@@ -29,17 +29,18 @@ pub(super) struct Run {
 enum Stand {
     /// On different lines through the centre on every disk: they can form a seven-bar.
     Apart,
-    /// On the same azimuth on some disk.
+    /// On (nearly) the same azimuth on some disk.
     Same,
     /// On one line through the centre, on opposite sides, on some disk.
     Opposite,
 }
 
-/// Sine of the angle between two holes below which they are on one line.
-const ON_ONE_LINE: f64 = 1e-9;
+/// Sine of the angle between two holes below which they are on one line: closer ones would need
+/// bends that no displacement is given precisely enough for.
+const ON_ONE_LINE: f64 = 1e-4;
 
 /// Share of the run's length by which a bound must be missed to count.
-const BOUND_TOLERANCE: f64 = 1e-9;
+pub(super) const BOUND_TOLERANCE: f64 = 1e-9;
 
 /// The runs of a robot, base first; behind the last tendon's end there is a run without tendons.
 pub(super) fn runs(robot: &Robot) -> Vec<Run> {
@@ -78,6 +79,15 @@ fn stands(robot: &Robot, first: usize, last: usize) -> Vec<Stand> {
     stands
 }
 
+/// By how much a bend breaks a tendon's bound; negative where it leaves slack.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Overstretch {
+    /// As a share of the tendon's length in the run.
+    pub(super) share: f64,
+    /// As the bend across the plane of the pulled tendon that would take it up.
+    sideways: f64,
+}
+
 /// What the choice looks at.
 pub(super) struct Choice<'a> {
     pub(super) robot: &'a Robot,
@@ -102,10 +112,12 @@ impl Choice<'_> {
         if let Some(twin) = self.most_pulled(run, |k| k != first && stand(k) == Stand::Same) {
             return Err(self.same_azimuth(run, first, twin));
         }
+        // The pulled tendon leaves the bend across its own plane open; of those that would be
+        // stretched, the one that asks for most of it decides.
         let taut = (0..tendons)
             .filter(|&k| k != first && stand(k) == Stand::Apart)
-            .map(|k| (k, self.overstretch(run, first, k)))
-            .filter(|(_, overstretch)| *overstretch > BOUND_TOLERANCE)
+            .filter(|&k| self.overstretch(run, first, k).share > BOUND_TOLERANCE)
+            .map(|k| (k, self.overstretch(run, first, k).sideways))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         Ok(taut.map_or(Drive::One(first), |(second, _)| Drive::Two(first, second)))
     }
@@ -120,24 +132,26 @@ impl Choice<'_> {
             .reduce(|best, k| if pull(k) > pull(best) { k } else { best })
     }
 
-    /// By how much, as a share of its length in the run, the bend of `pulled` alone would stretch
-    /// tendon `k` beyond its bound; to first order. Free tendons have no bound.
-    fn overstretch(&self, run: &Run, pulled: usize, k: usize) -> f64 {
+    /// What the bend of tendon `pulled` alone asks of tendon `k` beyond its bound, to first order. Free
+    /// tendons have no bound.
+    pub(super) fn overstretch(&self, run: &Run, pulled: usize, k: usize) -> Overstretch {
         let path = &self.robot.paths()[k];
         if path.end() < run.last || self.displacements[k].is_infinite() {
-            return f64::NEG_INFINITY;
+            return Overstretch { share: f64::NEG_INFINITY, sideways: f64::NEG_INFINITY };
         }
         let lengths = self.robot.backbone().lengths();
         let ratio = -self.displacements[pulled] / self.robot.paths()[pulled].rest_length;
-        let (mut stretch, mut rest) = (0.0, 0.0);
+        let (mut stretch, mut rest, mut lever) = (0.0, 0.0, 0.0);
         for i in run.first..run.last {
             let (a, b) = (&self.pieces[pulled][i], &self.pieces[k][i]);
             let (arm, other) = (a.lower + a.upper, b.lower + b.upper);
             let bend = ratio * a.rest / arm.norm_squared().max(f64::MIN_POSITIVE);
             stretch -= lengths[i] * bend * arm.dot(&other);
             rest += lengths[i] * b.rest;
+            lever += 0.5 * lengths[i] * arm.cross(&other).norm() / arm.norm();
         }
-        stretch / rest - self.displacements[k] / path.rest_length
+        let share = stretch / rest - self.displacements[k] / path.rest_length;
+        Overstretch { share, sideways: share * rest / lever.max(f64::MIN_POSITIVE) }
     }
 
     fn same_azimuth(&self, run: &Run, first: usize, second: usize) -> InvalidInput {
@@ -145,7 +159,8 @@ impl Choice<'_> {
         let (a, b) = (&names[first], &names[second]);
         InvalidInput::new(
             "displacements",
-            "linkage tendons on different azimuths (free one with inf, or use another model)",
+            "linkage tendons on different azimuths (1e-4 rad or more apart; free one with inf, or use \
+             another model)",
             format!(
                 "'{a}' and '{b}' pulled on one azimuth between disks {} and {}",
                 run.first, run.last

@@ -1,18 +1,18 @@
 //! What stood in the way of a solve, in words.
 
 use super::chain::{Failure, Linkage, Workspace};
-use super::drive::{Drive, Run};
-use super::subsegment::Obstacle;
-use crate::model::State;
+use super::drive::{BOUND_TOLERANCE, Drive, Run};
+use super::seven_bar::linear_bend;
+use super::subsegment::{BEND_MARGIN, Obstacle};
 use crate::solve::sqp::Ending;
 
 impl Linkage<'_> {
     /// What stood in the way of the last solve in `work`; empty when it converged.
     pub(super) fn describe(&self, displacements: &[f64], work: &Workspace) -> String {
         match work.failure {
-            None => String::new(),
-            Some(Failure::Reach { disk, run, obstacle: Obstacle::Bend(half) }) => {
-                self.too_few(disk, run, half)
+            None => self.pushing(displacements, work),
+            Some(Failure::Reach { disk, run, obstacle: Obstacle::Bend }) => {
+                self.too_few(disk, run, work.drives[run], displacements)
             }
             Some(Failure::Reach { disk, run, obstacle: Obstacle::Piece(hole) }) => {
                 let tendon = match (work.drives[run], hole) {
@@ -21,7 +21,7 @@ impl Linkage<'_> {
                     (Drive::None, _) => return String::new(),
                 };
                 format!(
-                    "tendon '{}' is pulled by {} m, as long as its path of {} m: no length is left \
+                    "tendon '{}' is pulled by {} m, its path of {} m or more: no length is left \
                      between disks {} and {disk}",
                     self.robot.tendon_names()[tendon],
                     -displacements[tendon],
@@ -37,31 +37,71 @@ impl Linkage<'_> {
                 };
                 format!("failed at disk {disk}: {reason}")
             }
-            Some(Failure::Bound) => self.bound_message(displacements, &work.state),
+            Some(Failure::Bound) => self.bound_message(displacements, work),
         }
     }
 
-    /// The smallest number of subsegments that takes the pull: more than `|(C, S)| / 2`.
-    fn too_few(&self, disk: usize, run: usize, half: f64) -> String {
+    /// The smallest number of subsegments that takes the pull: more than `|(C, S)| / 2`, from the
+    /// shortenings of the whole run.
+    fn too_few(&self, disk: usize, run: usize, drive: Drive, displacements: &[f64]) -> String {
         let Run { first, last, .. } = self.plan.runs[run];
         let arcs = self.robot.backbone().arc_lengths();
-        let needed = half * (arcs[last] - arcs[first]) / (arcs[disk] - arcs[disk - 1]);
+        let shortening = |k: usize| {
+            let path = &self.robot.paths()[k];
+            // Alike holes: the pieces are as long as the subsegments.
+            let share = if (first, last) == (0, path.end()) {
+                1.0
+            } else {
+                (arcs[last] - arcs[first]) / path.rest_length
+            };
+            (path.holes[last], -displacements[k] * share)
+        };
+        let (c, s) = match drive {
+            Drive::None => return String::new(),
+            Drive::One(k) => linear_bend(&[shortening(k)]),
+            Drive::Two(a, b) => linear_bend(&[shortening(a), shortening(b)]),
+        };
+        let needed = 0.5 * c.hypot(s);
+        let here = last - first;
+        // Not below what is there, however the last digits fell.
+        let least = ((needed * (1.0 + BEND_MARGIN)).floor() + 1.0).max(here as f64 + 1.0);
         format!(
             "failed at disk {disk}: the pull bends a subsegment beyond a half turn; between disks \
-             {first} and {last} it takes at least {} subsegments (n > {needed:.4}), here there are {}",
-            needed.floor() + 1.0,
-            last - first,
+             {first} and {last} it takes at least {least} subsegments (n > {needed:.6}), here there \
+             are {here}",
         )
     }
 
-    fn bound_message(&self, displacements: &[f64], state: &State) -> String {
+    /// What a converged answer should still say: the linkage keeps both lengths, as in the paper, also
+    /// where the second tendon would have to push.
+    fn pushing(&self, displacements: &[f64], work: &Workspace) -> String {
+        let choice = self.choice(displacements);
+        let names = self.robot.tendon_names();
+        for (run, drive) in self.plan.runs.iter().zip(&work.drives) {
+            let Drive::Two(a, b) = *drive else { continue };
+            for (alone, pushed) in [(a, b), (b, a)] {
+                let share = choice.overstretch(run, alone, pushed).share;
+                if displacements[alone] < 0.0 && share < -BOUND_TOLERANCE {
+                    return format!(
+                        "'{}' is kept at its length and would have to push: '{}' alone shortens it \
+                         further; free it (inf) to let it go slack",
+                        names[pushed], names[alone],
+                    );
+                }
+            }
+        }
+        String::new()
+    }
+
+    fn bound_message(&self, displacements: &[f64], work: &Workspace) -> String {
+        let state = &work.state;
         let names = self.robot.tendon_names();
         let list = |tendons: &[usize]| {
             let quoted: Vec<String> = tendons.iter().map(|k| format!("'{}'", names[*k])).collect();
             quoted.join(", ")
         };
         let mut parts: Vec<String> = Vec::new();
-        for k in self.overlong(displacements, state) {
+        for k in self.overlong(displacements, &work.drives, state) {
             let needs = state.tendon_lengths[k] - self.robot.paths()[k].rest_length;
             let given = displacements[k];
             parts.push(format!("'{}' would need {needs:+.6} m and has {given:+.6} m", names[k]));

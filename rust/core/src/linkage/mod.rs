@@ -31,6 +31,9 @@ pub struct LinkageSettings {
     pub max_iterations: usize,
 }
 
+/// Newton steps per subsegment that can be asked for: one that needs more never ends.
+const MOST_ITERATIONS: usize = 10_000;
+
 impl Default for LinkageSettings {
     fn default() -> Self {
         Self { step_tolerance: 1e-9, max_iterations: 50 }
@@ -47,8 +50,9 @@ impl LinkageSettings {
             let got = self.step_tolerance;
             return Err(InvalidInput::new("step_tolerance", "a number in (0, 1e-3] [rad]", got));
         }
-        if self.max_iterations == 0 {
-            return Err(InvalidInput::new("max_iterations", "at least 1", 0));
+        if self.max_iterations == 0 || self.max_iterations > MOST_ITERATIONS {
+            let expected = format!("1 to {MOST_ITERATIONS}");
+            return Err(InvalidInput::new("max_iterations", expected, self.max_iterations));
         }
         Ok(())
     }

@@ -30,7 +30,11 @@ pub struct Hole {
 impl Hole {
     /// From its places on both disks and the pull.
     #[must_use]
-    pub fn new(lower: Vector3<f64>, upper: Vector3<f64>, pull: f64) -> Self {
+    pub fn new(lower: Vector3<f64>, mut upper: Vector3<f64>, pull: f64) -> Self {
+        // Azimuths a full turn apart and the like: one hole but for rounding.
+        if (upper - lower).norm() <= 1e-12 * upper.norm() {
+            upper = lower;
+        }
         let rest = (1.0 + (upper - lower).norm_squared()).sqrt();
         Self { lower, upper, pull, rest }
     }

@@ -31,11 +31,14 @@ pub(super) struct Answer {
     pub(super) iterations: usize,
 }
 
+/// Rounding of the bound on the bend: closer to it the answer would have half its digits.
+pub(super) const BEND_MARGIN: f64 = 1e-12;
+
 /// Why a subsegment cannot follow its tendons, known before it is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Obstacle {
-    /// Half the norm of `(c, s)` reaches 1: the sine of half the bend.
-    Bend(f64),
+    /// Half the norm of `(c, s)`, which is the sine of half the bend, reaches 1.
+    Bend,
     /// A hole (0 or 1) whose tendon piece would have no length left.
     Piece(usize),
 }
@@ -59,13 +62,12 @@ impl Question {
                 (&holes[..], bound)
             }
         };
-        // Written so that a NaN counts as out of reach.
-        if let Some(half) =
-            bound.filter(|half| !matches!(half.partial_cmp(&1.0), Some(o) if o.is_lt()))
-        {
-            return Some(Obstacle::Bend(half));
+        if let Some(hole) = holes.iter().position(|hole| hole.pull >= hole.rest) {
+            return Some(Obstacle::Piece(hole));
         }
-        holes.iter().position(|hole| hole.pull >= hole.rest).map(Obstacle::Piece)
+        // Written so that a NaN counts as out of reach.
+        let within = |half: f64| half < 1.0 - BEND_MARGIN;
+        bound.is_some_and(|half| !within(half)).then_some(Obstacle::Bend)
     }
 
     /// Solves the linkage.
@@ -102,7 +104,22 @@ impl Question {
             Self::Spatial(holes) => SevenBar::<1>::new(holes).start(),
             Self::Pair(holes) => SevenBar::<2>::new(holes).start(),
         };
-        Answer::new(&pose, Ending::Infeasible, 0.0, 0)
+        Answer::new(&pose, Ending::Infeasible, self.violation(&pose), 0)
+    }
+
+    /// Largest relative error of a tendon piece at a pose.
+    fn violation(&self, pose: &Pose) -> f64 {
+        let holes = match self {
+            Self::Straight => return 0.0,
+            Self::Planar(hole) => std::slice::from_ref(hole),
+            Self::Spatial(holes) => &holes[..1],
+            Self::Pair(holes) => &holes[..],
+        };
+        let error = |hole: &Hole| {
+            let piece = (pose.link + pose.rotation() * hole.upper - hole.lower).norm();
+            (piece - (hole.rest - hole.pull)).abs() / hole.rest
+        };
+        holes.iter().map(error).fold(0.0, f64::max)
     }
 }
 

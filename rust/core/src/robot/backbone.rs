@@ -43,8 +43,9 @@ impl BackboneSpec {
     }
 }
 
-/// Subsegments of a backbone at most: far beyond any robot, and far within any memory.
-const MOST_SUBSEGMENTS: usize = 1_000_000;
+/// Subsegments of a backbone at most: far beyond any robot, within any memory, and a solve stays
+/// within 0.1 s, which is how long Ctrl-C may wait.
+const MOST_SUBSEGMENTS: usize = 100_000;
 
 /// A checked backbone. Disks are numbered 0 (base) to n (tip); subsegment i joins disks i and i + 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +60,7 @@ impl Backbone {
     ///
     /// # Errors
     /// `InvalidInput` naming the field: no stretch, a length that is not positive, a stretch without
-    /// subsegments, more than a million of them, Poisson's ratio outside (-1, 0.5], a rest shape of another length than the
+    /// subsegments, more than 100,000 of them, Poisson's ratio outside (-1, 0.5], a rest shape of another length than the
     /// backbone or bent by more than pi per subsegment, Young's modulus without diameter, a
     /// modulus, diameter or disk radius that is not positive.
     pub fn new(mut spec: BackboneSpec) -> Result<Self, InvalidInput> {
@@ -72,7 +73,7 @@ impl Backbone {
             return Err(InvalidInput::new("subsegments", expected, spec.subsegments.len()));
         }
         for &length in &spec.length {
-            positive("length", "m", length)?;
+            crate::error::length("length", length)?;
         }
         if let Some(count) = spec.subsegments.iter().find(|&&count| count < 1) {
             return Err(InvalidInput::new("subsegments", "at least 1 per stretch", count));
@@ -256,11 +257,11 @@ fn check_material(spec: &BackboneSpec, n: usize) -> Result<(), InvalidInput> {
             return Err(InvalidInput::new("diameter", expected, diameter.len()));
         }
         for &value in diameter {
-            positive("diameter", "m", value)?;
+            crate::error::length("diameter", value)?;
         }
     }
     if let Some(radius) = spec.disk_radius {
-        positive("disk_radius", "m", radius)?;
+        crate::error::length("disk_radius", radius)?;
     }
     Ok(())
 }

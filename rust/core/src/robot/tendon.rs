@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::bits::{Bits, hash_by_bits};
-use crate::error::{InvalidInput, finite, positive};
+use crate::error::{InvalidInput, finite, length, positive};
 
 /// One value for all disks, or one per disk 0..end.
 #[derive(Clone, Debug, PartialEq)]
@@ -236,7 +236,7 @@ fn check_numbers(routing: &mut Routing) -> Result<(), InvalidInput> {
         Routing::Helical { azimuth, radius, turns } => {
             *azimuth = finite("azimuth", "rad", *azimuth)?;
             *turns = finite("turns", "1", *turns)?;
-            positive("radius", "m", *radius).map(|_| ())
+            length("radius", *radius).map(|_| ())
         }
         Routing::Holes { indices, count, radius, azimuth } => {
             *azimuth = finite("azimuth", "rad", *azimuth)?;
@@ -254,7 +254,7 @@ fn check_numbers(routing: &mut Routing) -> Result<(), InvalidInput> {
 
 fn check_radius(radius: &PerDisk) -> Result<(), InvalidInput> {
     for &value in radius.as_slice() {
-        positive("radius", "m", value)?;
+        length("radius", value)?;
     }
     Ok(())
 }

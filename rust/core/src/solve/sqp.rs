@@ -72,7 +72,7 @@ pub struct Settings {
 pub enum Ending {
     /// The Newton step fell below the tolerance with the constraints met.
     Converged,
-    /// The constraint violation has a nonzero local minimum at the last point.
+    /// The constraint violation has a nonzero local minimum, which is the last point.
     Infeasible,
     /// Out of iterations, or no further decrease.
     IterationLimit,
@@ -153,8 +153,32 @@ impl<P: Copy, const N: usize, const M: usize> Slot<P, N, M> {
     }
 }
 
-/// Minimises `problem` from `start`.
+/// Minimises `problem` from `start`. Where the iteration fails with the constraints unmet, it looks
+/// for a feasible point, and starts again from there or says that there is none nearby.
 pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
+    problem: &P,
+    start: P::Point,
+    settings: &Settings,
+) -> Solution<P::Point, M> {
+    let found = descend(problem, start, settings);
+    if found.ending != Ending::IterationLimit || found.violation <= settings.constraint_tolerance {
+        return found;
+    }
+    let (point, violation) = restore(problem, found.point, settings);
+    if violation > settings.constraint_tolerance {
+        // No settling between the tolerances: a stationary violation is well above rounding.
+        let infeasible = violation > settings.constraint_tolerance.sqrt();
+        let ending = if infeasible { Ending::Infeasible } else { Ending::IterationLimit };
+        return Solution { point, ending, violation, ..found };
+    }
+    if !problem.admissible(&point) {
+        return found;
+    }
+    let again = descend(problem, point, settings);
+    Solution { iterations: found.iterations + again.iterations, ..again }
+}
+
+fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
     problem: &P,
     start: P::Point,
     settings: &Settings,
@@ -164,14 +188,14 @@ pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
     let (mut here, mut there) = (&mut one, &mut other);
     problem.linearize(&here.point, &mut here.at);
     let mut penalty = INITIAL_PENALTY;
-    let mut ending = None;
+    let mut ending = Ending::IterationLimit;
     let mut iterations = 0;
     let mut frame = Frame::new();
     frame.adapt(&here.at);
-    while ending.is_none() && iterations < settings.max_iterations {
+    while iterations < settings.max_iterations {
         let hessian = problem.hessian(&here.point, &frame.multipliers);
         let Some(step) = frame.newton_step(&here.at, hessian) else {
-            ending = Some(Ending::NumericalError);
+            ending = Ending::NumericalError;
             break;
         };
         iterations += 1;
@@ -190,34 +214,55 @@ pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
         std::mem::swap(&mut here, &mut there);
         frame.adapt(&here.at);
         if last && here.at.constraints.amax() <= settings.constraint_tolerance {
-            ending = Some(Ending::Converged);
+            ending = Ending::Converged;
+            break;
         }
+    }
+    if ending == Ending::IterationLimit && !here.at.objective.is_finite() {
+        ending = Ending::NumericalError;
     }
     Solution {
         point: here.point,
         multipliers: frame.multipliers,
-        ending: ending.unwrap_or_else(|| stalled(&here.at, settings)),
+        ending,
         iterations,
         violation: here.at.constraints.amax(),
         stationarity: frame.stationarity(),
     }
 }
 
-/// No decrease or no iteration left: infeasible where the squared violation is stationary at a nonzero value.
-fn stalled<const N: usize, const M: usize>(
-    at: &Linearization<N, M>,
+/// Steps of the search for a feasible point.
+const RESTORATION_STEPS: usize = 100;
+
+/// Levenberg-Marquardt on the constraints alone: the point where the violation ends, and its size.
+fn restore<const N: usize, const M: usize, P: Problem<N, M>>(
+    problem: &P,
+    start: P::Point,
     settings: &Settings,
-) -> Ending {
-    if !at.objective.is_finite() {
-        return Ending::NumericalError;
+) -> (P::Point, f64) {
+    let (mut one, mut other) = (Slot::new(start), Slot::new(start));
+    let (mut here, mut there) = (&mut one, &mut other);
+    problem.linearize(&here.point, &mut here.at);
+    let mut damping = 1e-3;
+    for _ in 0..RESTORATION_STEPS {
+        let (constraints, columns) = (&here.at.constraints, &here.at.jacobian_transposed);
+        if constraints.amax() <= settings.constraint_tolerance || damping > 1e12 {
+            break;
+        }
+        let gram = columns.transpose() * columns;
+        let shift = SMatrix::<f64, M, M>::from_diagonal_element(damping * gram.trace());
+        let Some(inverse) = (gram + shift).try_inverse() else { break };
+        let step = columns * (inverse * constraints) * -1.0;
+        let size = problem.step_size(&step).max(f64::MIN_POSITIVE);
+        there.go(problem, here, &step, (settings.step_bound / size).min(1.0));
+        if there.at.constraints.norm_squared() < here.at.constraints.norm_squared() {
+            std::mem::swap(&mut here, &mut there);
+            damping = (0.2 * damping).max(1e-15);
+        } else {
+            damping *= 4.0;
+        }
     }
-    let violation = at.constraints.amax();
-    let descent = (at.jacobian_transposed * at.constraints).amax();
-    if violation > settings.constraint_tolerance.sqrt() && descent <= 1e-3 * violation {
-        Ending::Infeasible
-    } else {
-        Ending::IterationLimit
-    }
+    (here.point, here.at.constraints.amax())
 }
 
 /// Backtracks along the step until the augmented Lagrangian falls enough; the accepted point is in
