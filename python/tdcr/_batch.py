@@ -206,25 +206,22 @@ def forward_batch(
         if field not in FIELDS:
             expected = ", ".join(FIELDS)
             raise InvalidInput(f"fields: expected names of {expected}, got {field!r}", "fields")
-    rows = np.array(displacements, order="C")
-    with _told(progress, len(rows) if rows.ndim else 0) as tell:
+    with _told(progress, displacements) as tell:
         columns = _core._forward_batch(
             robot,
-            rows,
+            displacements,
             model=model,
             settings=settings,
             fields=list(fields),
             threads=threads,
             progress=tell,
         )
-    rows = rows.astype(np.float64, copy=False)
-    rows.flags.writeable = False
-    return ShapeBatch(robot, rows, model, settings, columns)
+    return ShapeBatch(robot, columns.pop("displacements"), model, settings, columns)
 
 
 @contextmanager
 def _told(
-    progress: bool | Callable[[int], object], total: int
+    progress: bool | Callable[[int], object], displacements: ArrayLike
 ) -> Iterator[Callable[[int], object] | None]:
     """Give the callable that is told the rows done, or None."""
     if callable(progress):
@@ -235,7 +232,7 @@ def _told(
 
         columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         with Progress(*columns, console=Console(stderr=True)) as bar:
-            task = bar.add_task("forward_batch", total=total)
+            task = bar.add_task("forward_batch", total=len(np.asarray(displacements)))
             yield lambda done: bar.update(task, completed=done)
     else:
         yield None

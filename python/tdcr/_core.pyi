@@ -1,4 +1,4 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from typing import Any, Self, TypeAlias, final
 
@@ -143,7 +143,7 @@ class Robot:
     def __new__(
         cls,
         backbone: Backbone,
-        tendons: Sequence[Tendon],
+        tendons: Iterable[Tendon],
         *,
         base: ArrayLike | None = None,
         tool: ArrayLike | None = None,

@@ -132,7 +132,9 @@ def test_empty_batches_are_fine():
         ),
         ("fields", "got 'shape'", lambda: solve(rows(), fields=("tip", "shape"))),
         ("threads", "got 0", lambda: solve(rows(), threads=0)),
-        ("threads", "got 0", lambda: solve(rows(), threads=-4)),
+        ("threads", "got -4", lambda: solve(rows(), threads=-4)),
+        ("threads", "got 10000000", lambda: solve(rows(), threads=10**30)),
+        ("displacements", "rectangular", lambda: solve([[0, 0], [1]])),
     ],
 )
 def test_bad_input_is_said(argument, words, call):

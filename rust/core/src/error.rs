@@ -40,7 +40,7 @@ pub(crate) fn finite(argument: &str, unit: &str, value: f64) -> Result<f64, Inva
     if value.is_finite() {
         Ok(value + 0.0)
     } else {
-        Err(InvalidInput::new(argument, format!("a finite number [{unit}]"), value))
+        Err(InvalidInput::new(argument, format!("a finite number [{unit}]"), format!("{value:?}")))
     }
 }
 
@@ -53,7 +53,7 @@ pub(crate) fn length(argument: &str, value: f64) -> Result<f64, InvalidInput> {
     if (1e-15..=1e15).contains(&value) {
         Ok(value)
     } else {
-        Err(InvalidInput::new(argument, "a length from 1e-15 to 1e15 m", value))
+        Err(InvalidInput::new(argument, "a length from 1e-15 to 1e15 m", format!("{value:?}")))
     }
 }
 
@@ -65,6 +65,10 @@ pub(crate) fn positive(argument: &str, unit: &str, value: f64) -> Result<f64, In
     if value.is_finite() && value > 0.0 {
         Ok(value)
     } else {
-        Err(InvalidInput::new(argument, format!("a positive finite number [{unit}]"), value))
+        Err(InvalidInput::new(
+            argument,
+            format!("a positive finite number [{unit}]"),
+            format!("{value:?}"),
+        ))
     }
 }

@@ -7,9 +7,8 @@ use pyo3::types::{PyDict, PyTuple};
 
 use tdcr::robot::{self as core, BackboneSpec};
 
-use crate::convert::{
-    OneOrMany, count, frozen, frozen_points, invalid, list_text, one_or_tuple, vectors,
-};
+use crate::arguments::{OneOrMany, number, whole};
+use crate::convert::{frozen, frozen_points, invalid, list_text, one_or_tuple, vectors};
 
 /// The flexible spine of a robot.
 ///
@@ -45,7 +44,7 @@ use crate::convert::{
 pub(crate) struct Backbone(pub(crate) core::Backbone);
 
 fn diameters(diameter: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
-    let extract = |d| OneOrMany::<f64>::extract("diameter", "a number", d);
+    let extract = |d| OneOrMany::extract("diameter", d, number);
     Ok(diameter.map(extract).transpose()?.map(OneOrMany::into_vec))
 }
 
@@ -63,10 +62,9 @@ impl Backbone {
         diameter: Option<&Bound<'_, PyAny>>,
         disk_radius: Option<f64>,
     ) -> PyResult<Self> {
-        let counts = OneOrMany::<i64>::extract("subsegments", "an int", subsegments)?.into_vec();
         let spec = BackboneSpec {
-            length: OneOrMany::<f64>::extract("length", "a number", length)?.into_vec(),
-            subsegments: counts.into_iter().map(count).collect(),
+            length: OneOrMany::extract("length", length, number)?.into_vec(),
+            subsegments: OneOrMany::extract("subsegments", subsegments, whole)?.into_vec(),
             poisson_ratio,
             rest: rest.map(|rest| vectors("rest", rest)).transpose()?,
             youngs_modulus,
@@ -101,7 +99,7 @@ impl Backbone {
                         diameter=None, disk_radius=None))]
     fn from_curve(
         points: &Bound<'_, PyAny>,
-        subsegments: i64,
+        subsegments: &Bound<'_, PyAny>,
         poisson_ratio: f64,
         youngs_modulus: Option<f64>,
         diameter: Option<&Bound<'_, PyAny>>,
@@ -112,7 +110,7 @@ impl Backbone {
             youngs_modulus,
             diameter: diameters(diameter)?,
             disk_radius,
-            ..BackboneSpec::straight(1.0, count(subsegments))
+            ..BackboneSpec::straight(1.0, whole("subsegments", subsegments)?)
         };
         core::Backbone::from_curve(&vectors("points", points)?, spec)
             .map(Self)

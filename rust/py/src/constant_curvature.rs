@@ -131,11 +131,11 @@ pub(crate) fn _arc_frames(
     kappa: &Bound<'_, PyAny>,
     phi: &Bound<'_, PyAny>,
     ell: &Bound<'_, PyAny>,
-    points: i64,
+    points: &Bound<'_, PyAny>,
     base: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Py<PyAny>> {
     let arcs = arcs(kappa, phi, ell)?;
-    let points = crate::convert::count(points);
+    let points = crate::arguments::whole("points", points)?;
     if points < 2 {
         let expected = "at least 2 frames per segment (base and tip)";
         return Err(invalid(&InvalidInput::new("points", expected, points)));

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix4, Vector3};
 use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::{PyOverflowError, PyTypeError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyTuple, PyType};
@@ -57,61 +57,9 @@ impl Lazy {
     }
 }
 
-/// A number or a sequence of numbers.
-pub(crate) enum OneOrMany<T> {
-    /// A single one.
-    One(T),
-    /// One per stretch, disk or subsegment.
-    Many(Vec<T>),
-}
-
-impl<T: Clone> OneOrMany<T> {
-    pub(crate) fn into_vec(self) -> Vec<T> {
-        match self {
-            Self::One(value) => vec![value],
-            Self::Many(values) => values,
-        }
-    }
-}
-
-impl<'py, T> OneOrMany<T>
-where
-    T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
-{
-    /// A number if it is one, else a sequence; names the argument in a `TypeError`.
-    pub(crate) fn extract(argument: &str, kind: &str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let wrong = || {
-            let message = format!(
-                "{argument}: expected {kind} or a sequence of them, got {}",
-                type_name(value)
-            );
-            PyTypeError::new_err(message)
-        };
-        match value.extract() {
-            Ok(one) => return Ok(Self::One(one)),
-            Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
-                let expected = format!("{kind} of at most 64 bits");
-                return Err(invalid(&InvalidInput::new(argument, expected, value)));
-            }
-            Err(_) => {}
-        }
-        if value.is_instance_of::<pyo3::types::PyString>() {
-            return Err(wrong());
-        }
-        let items = value.try_iter().map_err(|_| wrong())?;
-        let many: PyResult<Vec<T>> = items.map(|item| item?.extract()).collect();
-        many.map(Self::Many).map_err(|_| wrong())
-    }
-}
-
 /// The name of a value's type, for messages.
 pub(crate) fn type_name(value: &Bound<'_, PyAny>) -> String {
     value.get_type().name().map_or_else(|_| "another type".to_owned(), |name| name.to_string())
-}
-
-/// A count: negative ones become 0, which the core refuses with its own message.
-pub(crate) fn count(value: i64) -> usize {
-    usize::try_from(value).unwrap_or(0)
 }
 
 /// An array of numbers of any shape as C-order float64.

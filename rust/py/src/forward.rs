@@ -12,6 +12,7 @@ use tdcr::linkage::{Linkage, LinkageSettings};
 use tdcr::model::Model;
 use tdcr::{InvalidInput, Status};
 
+use crate::arguments::{optional, whole};
 use crate::convert::{float_array, frozen, invalid, status, type_name, values, wrong_shape};
 use crate::long_call;
 use crate::robot::Robot;
@@ -196,7 +197,7 @@ pub(crate) fn _forward_batch<'py>(
     model: &str,
     settings: Option<&Bound<'py, PyAny>>,
     fields: Vec<String>,
-    threads: Option<i64>,
+    threads: Option<&Bound<'py, PyAny>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let choice = Choice::new(model, settings)?;
@@ -221,7 +222,8 @@ pub(crate) fn _forward_batch<'py>(
         tensions: fields.iter().any(|f| f == "tensions"),
         energy: fields.iter().any(|f| f == "energy"),
     };
-    let pool = pool(threads.map(crate::convert::count)).map_err(|e| invalid(&e))?;
+    let threads = optional("threads", threads, whole)?;
+    let pool = pool(threads).map_err(|e| invalid(&e))?;
     let flat = values(&array)?;
     let solved = match choice {
         Choice::Linkage(settings) => {
@@ -241,7 +243,9 @@ pub(crate) fn _forward_batch<'py>(
     };
     // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
     let solved = solved.map_err(|e| invalid(&e))?.unwrap_or_default();
-    export(py, robot, wanted, solved)
+    let answer = export(py, robot, wanted, solved)?;
+    answer.set_item("displacements", frozen(py, flat.to_vec(), &[rows, tendons])?)?;
+    Ok(answer)
 }
 
 fn export<'py>(

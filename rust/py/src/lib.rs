@@ -7,6 +7,7 @@
 // pyo3 hands arguments over by value, and getters take self whether they look at it or not.
 #![allow(clippy::needless_pass_by_value, clippy::unused_self)]
 
+mod arguments;
 mod backbone;
 mod constant_curvature;
 mod convert;

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple, PyType};
 
@@ -9,8 +10,9 @@ use tdcr::constant_curvature::{self, ConstantCurvatureSettings};
 use tdcr::robot as core;
 use tdcr::{InvalidInput, linkage};
 
+use crate::arguments::{optional, text};
 use crate::backbone::Backbone;
-use crate::convert::{Lazy, frozen, frozen_frames, invalid, matrix4};
+use crate::convert::{Lazy, frozen, frozen_frames, invalid, matrix4, type_name};
 use crate::tendon::Tendon;
 
 /// A backbone with tendons, placed in the world. Checked once, then immutable.
@@ -84,20 +86,37 @@ impl std::hash::Hash for Robot {
     }
 }
 
+/// The tendons of an iterable.
+fn tendons_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<core::Tendon>> {
+    let wrong = |got: &Bound<'_, PyAny>| {
+        let got = type_name(got);
+        PyTypeError::new_err(format!("tendons: expected a sequence of Tendon, got {got}"))
+    };
+    let items = value.try_iter().map_err(|_| wrong(value))?;
+    items
+        .map(|item| {
+            let item = item?;
+            let tendon = item.cast::<Tendon>().map_err(|_| wrong(&item))?;
+            Ok(tendon.get().0.clone())
+        })
+        .collect()
+}
+
 #[pymethods]
 impl Robot {
     #[new]
     #[pyo3(signature = (backbone, tendons, *, base=None, tool=None, name=None))]
     fn new(
         backbone: &Bound<'_, Backbone>,
-        tendons: Vec<Bound<'_, Tendon>>,
+        tendons: &Bound<'_, PyAny>,
         base: Option<&Bound<'_, PyAny>>,
         tool: Option<&Bound<'_, PyAny>>,
-        name: Option<String>,
+        name: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let name = optional("name", name, text)?;
         let base = base.map(|base| matrix4("base", base)).transpose()?;
         let tool = tool.map(|tool| matrix4("tool", tool)).transpose()?;
-        let tendons = tendons.iter().map(|tendon| tendon.get().0.clone()).collect();
+        let tendons = tendons_of(tendons)?;
         let backbone = backbone.get().0.clone();
         core::Robot::new(backbone, tendons, base.as_ref(), tool.as_ref(), name)
             .map(|robot| Self(Arc::new(robot), Arc::default()))
@@ -131,6 +150,13 @@ impl Robot {
     /// ----------
     /// path : str or os.PathLike
     ///     File ending in .toml or .json; replaced if it exists.
+    ///
+    /// Raises
+    /// ------
+    /// InvalidInput
+    ///     Another file ending.
+    /// OSError
+    ///     The file cannot be written.
     #[pyo3(signature = (path))]
     fn save(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
         slf.py().import("tdcr._files")?.call_method1("save_robot", (slf, path))?;

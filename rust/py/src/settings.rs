@@ -7,7 +7,8 @@ use tdcr::InvalidInput;
 use tdcr::constant_curvature as cc;
 use tdcr::linkage;
 
-use crate::convert::{count, invalid};
+use crate::arguments::whole;
+use crate::convert::invalid;
 
 /// How precisely and how long the linkage model solves each subsegment.
 ///
@@ -27,12 +28,18 @@ use crate::convert::{count, invalid};
 #[derive(Clone, PartialEq)]
 pub(crate) struct LinkageSettings(pub(crate) linkage::LinkageSettings);
 
+fn max_iterations(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    whole("max_iterations", value)
+}
+
 #[pymethods]
 impl LinkageSettings {
     #[new]
     #[pyo3(signature = (*, step_tolerance=1e-9, max_iterations=50))]
-    fn new(step_tolerance: f64, max_iterations: i64) -> PyResult<Self> {
-        let max_iterations = count(max_iterations);
+    fn new(
+        step_tolerance: f64,
+        #[pyo3(from_py_with = max_iterations)] max_iterations: usize,
+    ) -> PyResult<Self> {
         let settings = linkage::LinkageSettings { step_tolerance, max_iterations };
         settings.validate().map_err(|e| invalid(&e))?;
         Ok(Self(settings))

@@ -8,7 +8,8 @@ use pyo3::types::PyTuple;
 
 use tdcr::robot::{self as core, PerDisk, Routing};
 
-use crate::convert::{OneOrMany, count, invalid, list_text};
+use crate::arguments::{OneOrMany, number, optional, text, whole};
+use crate::convert::{invalid, list_text};
 
 /// A cable that runs from the base through one hole in every disk up to the disk where it ends.
 ///
@@ -42,7 +43,7 @@ use crate::convert::{OneOrMany, count, invalid, list_text};
 pub(crate) struct Tendon(pub(crate) core::Tendon);
 
 fn per_disk(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<PerDisk> {
-    Ok(match OneOrMany::<f64>::extract(argument, "a number", value)? {
+    Ok(match OneOrMany::extract(argument, value, number)? {
         OneOrMany::One(value) => PerDisk::Same(value),
         OneOrMany::Many(values) => PerDisk::Each(values),
     })
@@ -65,13 +66,13 @@ fn per_disk_text(value: &PerDisk) -> String {
 impl Tendon {
     fn build(
         routing: Routing,
-        end: Option<i64>,
+        end: Option<&Bound<'_, PyAny>>,
         stiffness: Option<f64>,
-        name: Option<String>,
+        name: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        core::Tendon::new(routing, end.map(count), stiffness, name)
-            .map(Self)
-            .map_err(|e| invalid(&e))
+        let end = optional("end", end, whole)?;
+        let name = optional("name", name, text)?;
+        core::Tendon::new(routing, end, stiffness, name).map(Self).map_err(|e| invalid(&e))
     }
 }
 
@@ -82,9 +83,9 @@ impl Tendon {
     fn new(
         azimuth: &Bound<'_, PyAny>,
         radius: &Bound<'_, PyAny>,
-        end: Option<i64>,
+        end: Option<&Bound<'_, PyAny>>,
         stiffness: Option<f64>,
-        name: Option<String>,
+        name: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let routing = Routing::Angles {
             azimuth: per_disk("azimuth", azimuth)?,
@@ -111,9 +112,9 @@ impl Tendon {
         azimuth: f64,
         radius: f64,
         turns: f64,
-        end: Option<i64>,
+        end: Option<&Bound<'_, PyAny>>,
         stiffness: Option<f64>,
-        name: Option<String>,
+        name: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         Self::build(Routing::Helical { azimuth, radius, turns }, end, stiffness, name)
     }
@@ -136,21 +137,17 @@ impl Tendon {
     #[pyo3(signature = (indices, count, radius, *, azimuth=0.0, end=None, stiffness=None,
                         name=None))]
     fn from_holes(
-        indices: Vec<i64>,
-        count: i64,
+        indices: &Bound<'_, PyAny>,
+        count: &Bound<'_, PyAny>,
         radius: &Bound<'_, PyAny>,
         azimuth: f64,
-        end: Option<i64>,
+        end: Option<&Bound<'_, PyAny>>,
         stiffness: Option<f64>,
-        name: Option<String>,
+        name: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        if let Some(index) = indices.iter().find(|index| **index < 0) {
-            let error = tdcr::InvalidInput::new("indices", "hole numbers from 0 on", index);
-            return Err(invalid(&error));
-        }
         let routing = Routing::Holes {
-            indices: indices.into_iter().map(crate::convert::count).collect(),
-            count: crate::convert::count(count),
+            indices: OneOrMany::extract("indices", indices, whole)?.into_vec(),
+            count: whole("count", count)?,
             radius: per_disk("radius", radius)?,
             azimuth,
         };
@@ -286,11 +283,11 @@ pub(crate) fn _tendon(
     azimuth: &Bound<'_, PyAny>,
     radius: &Bound<'_, PyAny>,
     turns: Option<f64>,
-    indices: Option<Vec<i64>>,
-    count: Option<i64>,
-    end: Option<i64>,
+    indices: Option<&Bound<'_, PyAny>>,
+    count: Option<&Bound<'_, PyAny>>,
+    end: Option<&Bound<'_, PyAny>>,
     stiffness: Option<f64>,
-    name: Option<String>,
+    name: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Tendon> {
     match (turns, indices, count) {
         (Some(turns), _, _) => {

@@ -153,7 +153,7 @@ impl Robot {
         let bad = displacements.iter().position(|d| d.is_nan() || *d == f64::NEG_INFINITY);
         bad.map_or(Ok(()), |k| {
             let expected = "finite numbers [m], or inf for a free tendon";
-            let got = format!("{} for tendon '{}'", displacements[k], self.tendon_names[k]);
+            let got = format!("{:?} for tendon '{}'", displacements[k], self.tendon_names[k]);
             Err(InvalidInput::new("displacements", expected, got))
         })
     }
