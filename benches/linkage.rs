@@ -3,7 +3,8 @@
 //! `seven_bar`: one solve from its own start (which is not the closed form), alike and differing holes.
 //! `chain_*`: whole robots per subsegment; `varied` changes its radii from disk to disk, so that every
 //! subsegment is a solve of its own, `uniform` solves one and reuses it. `batch`: rows on one and all
-//! threads. Every bench checks its answer first.
+//! threads. Every bench but the batch, whose
+//! rows the tests compare with single solves, checks its answer first.
 #![allow(missing_docs, clippy::unwrap_used)] // criterion's macros; a bench may stop on a bad answer.
 
 use std::hint::black_box;
@@ -14,7 +15,7 @@ use tdcr::Status;
 use tdcr::batch::{Control, Fields, pool, solve_rows};
 use tdcr::linkage::four_bar::FourBar;
 use tdcr::linkage::seven_bar::{Hole, SevenBar};
-use tdcr::linkage::{Linkage, LinkageSettings, Plan, Workspace};
+use tdcr::linkage::{Linkage, LinkageSettings, Plan, Pose, Workspace};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
 use tdcr::solve::sqp::{Ending, minimize};
@@ -29,6 +30,22 @@ fn holes(taper: f64) -> [Hole; 2] {
         .map(|(azimuth, pull)| Hole::new(polar(0.5, azimuth), polar(0.5 * taper, azimuth), pull))
 }
 
+/// Tendon pieces as long as asked, and for alike holes the closed form: bend `2 asin(|(c, s)| / 2)`.
+fn check(holes: &[Hole; 2], pose: &Pose) {
+    for hole in holes {
+        let piece = (pose.link + pose.rotation() * hole.upper - hole.lower).norm();
+        assert!((piece - (hole.rest - hole.pull)).abs() < 1e-14);
+    }
+    if holes.iter().all(Hole::is_alike) {
+        let [(a, p), (b, q)] = holes.map(|hole| (hole.upper, hole.pull));
+        let determinant = a.x * b.y - a.y * b.x;
+        let c = (p * b.y - q * a.y) / determinant;
+        let s = (a.x * q - b.x * p) / determinant;
+        let exact = Pose::bent(2.0 * (0.5 * c.hypot(s)).asin(), s.atan2(c));
+        assert!((pose.rotation() - exact.rotation()).amax() < 1e-13);
+    }
+}
+
 fn bars(c: &mut Criterion) {
     let settings = LinkageSettings::default().sqp();
     let mut group = c.benchmark_group("bar");
@@ -38,7 +55,9 @@ fn bars(c: &mut Criterion) {
             let problem = SevenBar::<2>::new(holes);
             minimize(&problem, problem.point(problem.start()), &settings)
         };
-        assert_eq!(solve(&holes).ending, Ending::Converged);
+        let found = solve(&holes);
+        assert_eq!(found.ending, Ending::Converged);
+        check(&holes, &found.point.pose);
         group.bench_function(name, |b| b.iter(|| solve(black_box(&holes))));
     }
     let hole = holes(1.0)[0];
@@ -46,7 +65,9 @@ fn bars(c: &mut Criterion) {
         let problem = FourBar::new(hole);
         minimize(&problem, problem.start(), &settings)
     };
-    assert_eq!(solve(&hole).ending, Ending::Converged);
+    let found = solve(&hole);
+    let exact = 2.0 * (0.5 * hole.pull / hole.upper.norm()).asin();
+    assert!(found.ending == Ending::Converged && (found.point.disk - exact).abs() < 1e-14);
     group.bench_function("four_bar/alike", |b| b.iter(|| solve(black_box(&hole))));
     group.finish();
 }
@@ -77,6 +98,11 @@ fn chains(c: &mut Criterion) {
             let mut work = Workspace::default();
             let report = model.solve(&displacements, &mut work).unwrap();
             assert_eq!(report.status, Status::Converged);
+            for (k, path) in robot.paths().iter().enumerate() {
+                let length = path.rest_length + displacements[k];
+                let off = model.state(&work).tendon_lengths[k] / length - 1.0;
+                assert!(off.abs() < 1e-12, "{off:e}");
+            }
             // Elements are subsegments: the time per element is the time per subsegment.
             group.throughput(Throughput::Elements(n as u64));
             group.bench_function(BenchmarkId::from_parameter(n), |b| {

@@ -134,7 +134,7 @@ def ours(pulls: Array, repeats: int) -> tuple[Array, float, float]:
 
 
 def check(name: str, pulls: Array, answers: Array, points: Array, error: Array) -> None:
-    """Where a peer differs it must be worse: not feasible, a higher objective, or the mirror image.
+    """Where a peer differs it must be worse: imprecise, infeasible, a higher minimum, or mirrored.
 
     The mirror image (the link reflected behind the base disk) has the same coupler angles.
     """
@@ -146,7 +146,10 @@ def check(name: str, pulls: Array, answers: Array, points: Array, error: Array) 
         (theirs, violation), (best, _) = evaluate(answer, row), evaluate(point, row)
         infeasible = float(ca.norm_inf(violation)) > AGREE
         mirrored = answer[2] < 0
-        if not (infeasible or mirrored or float(theirs) > float(best) * (1 - 1e-6)):
+        worse = float(theirs) > float(best) * (1 + 1e-12)
+        # Tiny pulls leave the link's direction loose: the same answer to fewer digits.
+        near = np.abs(answer - point).max() < 1e-5
+        if not (infeasible or mirrored or worse or near):
             raise AssertionError(f"{name} found a better answer for pulls {row * LENGTH}")
 
 

@@ -45,6 +45,10 @@ class ShapeBatch(Sequence["Shape"]):
     robot : Robot
     displacements : ndarray, shape (B, K)
         Negative pulls [m].
+    model : str
+    settings : LinkageSettings or ConstantCurvatureSettings or None
+    fields : tuple of str
+        Names of the fields that were asked for.
     tip : ndarray, shape (B, 4, 4)
         Frame of the tip disk in the world.
     frames : ndarray, shape (B, n + 1, 4, 4)

@@ -111,7 +111,9 @@ def _numbers(context: click.Context, parameter: click.Parameter, text: str) -> l
     help="Change of length of each tendon, with commas or spaces between them: negative pulls, "
     "0 holds, inf or free leaves the tendon idle.",
 )
-@click.option("--model", required=True, help="How the shape is found: linkage.")
+@click.option(
+    "--model", required=True, help="How the shape is found: linkage or constant_curvature."
+)
 @click.option(
     "--unit",
     type=click.Choice(["m", "mm"]),
@@ -141,6 +143,10 @@ def _forward(
         from tdcr._file_schema import metres
 
         displacements = [metres(by) for by in displacements]
+    if plot_file is not None:
+        from tdcr._plot import check_picture
+
+        check_picture(plot_file)
     shape = forward(Robot.load(robot), displacements, model=model)
     if json_file == "-":
         click.echo(_report.as_json(shape))

@@ -8,6 +8,7 @@ the field, what was expected and what was there. Imported on first use by ``Robo
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import secrets
@@ -262,6 +263,9 @@ def _entry(key: str, value: Any) -> str:
 def _replace(target: Path, content: bytes) -> None:
     """Write beside the target, then take its place in one step."""
     beside = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+    if not target.parent.is_dir():
+        # Else the error would name the file beside it.
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(target))
     try:
         with beside.open("xb") as stream:
             stream.write(content)

@@ -122,20 +122,35 @@ def save_picture(shape: Shape, path: str | os.PathLike[str], **options: Any) -> 
     OSError
         The file cannot be written.
     """
-    _require_matplotlib()
+    check_picture(path)
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=_SIZE, layout="constrained")
-    formats = figure.canvas.get_supported_filetypes()
+    flat = _is_flat(options.get("view", "auto"), plane_of(shape), None)
+    plot_shape(shape, ax=_axes(figure, flat), **options)
+    figure.savefig(path, dpi=160, bbox_inches="tight")
+
+
+def check_picture(path: str | os.PathLike[str]) -> None:
+    """Refuse a path that no picture can be written to, before anything is solved.
+
+    Raises
+    ------
+    InvalidInput
+        A format that matplotlib does not write.
+    ImportError
+        matplotlib is not installed.
+    """
+    _require_matplotlib()
+    from matplotlib.figure import Figure
+
+    formats = Figure().canvas.get_supported_filetypes()
     if os.path.splitext(path)[1][1:].lower() not in formats:
         known = ", ".join(f".{name}" for name in sorted(formats))
         raise InvalidInput(
             f"path: expected a picture file ending in one of {known}, got {os.fspath(path)!r}",
             "path",
         )
-    flat = _is_flat(options.get("view", "auto"), plane_of(shape), None)
-    plot_shape(shape, ax=_axes(figure, flat), **options)
-    figure.savefig(path, dpi=160, bbox_inches="tight")
 
 
 def _require_matplotlib() -> None:

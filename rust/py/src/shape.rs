@@ -227,12 +227,28 @@ impl Shape {
     ///
     /// Parameters
     /// ----------
-    /// **options
-    ///     `ax`, an Axes to draw into, and others; see `tdcr._plot.plot_shape`.
+    /// ax : matplotlib.axes.Axes, optional
+    ///     Axes to draw into, plain or 3-D. Default: those of a new figure.
+    /// view : {"auto", "2d", "3d"}, optional
+    ///     "auto" is the plane of the bend where the shape stays in one.
+    /// disks, tendons, legend : bool, optional
+    ///     What is drawn.
+    /// title : str, optional
+    ///     Default: name of the robot, model and status.
+    /// unit : {"auto", "m", "mm"}, optional
+    ///     Unit of the axes.
     ///
     /// Returns
     /// -------
     /// matplotlib.axes.Axes
+    ///     Not shown and not saved.
+    ///
+    /// Raises
+    /// ------
+    /// InvalidInput
+    ///     An unknown view or unit.
+    /// ImportError
+    ///     matplotlib is not installed.
     #[pyo3(signature = (**options))]
     fn plot<'py>(
         slf: &Bound<'py, Self>,
