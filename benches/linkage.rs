@@ -12,7 +12,7 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use tdcr::Status;
-use tdcr::batch::{Control, Fields, pool, solve_rows};
+use tdcr::batch::{Control, Field, Key, pool, solve_rows};
 use tdcr::linkage::four_bar::FourBar;
 use tdcr::linkage::seven_bar::{Hole, SevenBar};
 use tdcr::linkage::{Linkage, LinkageSettings, Plan, Pose, Workspace};
@@ -120,7 +120,6 @@ fn batches(c: &mut Criterion) {
     let rows = 2000_u32;
     let displacements: Vec<f64> =
         (0..rows).flat_map(|i| [-1e-5 * f64::from(i), -0.5e-5 * f64::from(i)]).collect();
-    let fields = Fields { tip: true, ..Fields::default() };
     let mut group = c.benchmark_group("batch");
     group.throughput(Throughput::Elements(u64::from(rows)));
     for (name, threads) in [("one_thread", Some(1)), ("all_threads", None)] {
@@ -129,8 +128,10 @@ fn batches(c: &mut Criterion) {
             b.iter(|| {
                 let control = Control::default();
                 let rows = rows as usize;
-                let solved = solve_rows(&model, &displacements, rows, fields, &pool, &control);
-                assert!(solved.unwrap().unwrap().tip.len() == 16 * rows);
+                let solved =
+                    solve_rows(&model, &displacements, rows, &[Field::Tip], &pool, &control);
+                let tips = solved.unwrap().unwrap();
+                assert_eq!(tips.values(Key::Tip).unwrap().len(), 16 * rows);
             });
         });
     }

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from tdcr import _core
-from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -20,17 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ShapeBatch", "forward_batch"]
 
-FIELDS = (
-    "tip",
-    "frames",
-    "positions",
-    "strains",
-    "tendon_points",
-    "tendon_lengths",
-    "tensions",
-    "energy",
-)
-ALWAYS = ("status", "ok", "residual", "iterations")
+FIELDS = _core._fields()
 
 
 class ShapeBatch(Sequence["Shape"]):
@@ -206,10 +195,6 @@ def forward_batch(
     """
     if isinstance(fields, str):
         fields = (fields,)
-    for field in fields:
-        if field not in FIELDS:
-            expected = ", ".join(FIELDS)
-            raise InvalidInput(f"fields: expected names of {expected}, got {field!r}", "fields")
     with _told(progress, displacements) as tell:
         columns = _core._forward_batch(
             robot,

@@ -19,6 +19,7 @@ __all__ = [
     "_arc_from_displacements",
     "_arc_jacobian",
     "_displacements_from_arc",
+    "_fields",
     "_forward_batch",
     "_rotation_vector",
     "_rust_defaults",
@@ -256,6 +257,7 @@ def jacobian(
     model: str,
     settings: LinkageSettings | ConstantCurvatureSettings | None = None,
 ) -> _Array: ...
+def _fields() -> tuple[str, ...]: ...
 def _forward_batch(
     robot: Robot,
     displacements: ArrayLike,

@@ -3,21 +3,12 @@
 use std::sync::atomic::Ordering;
 
 use tdcr::Status;
-use tdcr::batch::{Control, Fields, pool, solve_rows};
+use tdcr::batch::{Control, Field, Key, pool, solve_rows};
 use tdcr::linkage::{Linkage, LinkageSettings, Plan};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
 
-const ALL: Fields = Fields {
-    tip: true,
-    frames: true,
-    positions: true,
-    strains: true,
-    tendon_points: true,
-    tendon_lengths: true,
-    tensions: true,
-    energy: true,
-};
+const ALL: &[Field] = &Field::ALL;
 
 fn robot() -> Robot {
     let backbone = Backbone::new(BackboneSpec::straight(0.2, 5)).unwrap();
@@ -49,23 +40,28 @@ fn rows_equal_single_solves_on_any_number_of_threads() {
         columns
     };
     let (one, four) = (solve(1), solve(4));
-    assert_eq!(one.frames, four.frames);
+    for key in [Key::Frames, Key::TendonPoints(1), Key::Energy] {
+        assert_eq!(one.values(key), four.values(key));
+    }
     assert_eq!(one.reports, four.reports);
-    assert_eq!(one.tendon_points, four.tendon_points);
+    let of = |key| one.values(key).unwrap();
     for i in 0..1001 {
         let shape = model.shape(&rows[2 * i..2 * i + 2]).unwrap();
         assert_eq!(shape.report, one.reports[i]);
         assert_eq!(shape.report.status == Status::Infeasible, i % 7 == 0);
         let tip = shape.state.frames[5];
-        assert_eq!(one.tip[16 * i..16 * i + 16], tip.to_row_major());
-        assert_eq!(one.frames[16 * (6 * i + 5)..16 * (6 * i + 6)], tip.to_row_major());
-        assert_eq!(&one.positions[3 * (6 * i + 5)..3 * (6 * i + 6)], tip.translation.as_slice());
-        assert_eq!(&one.strains[15 * i + 12..15 * i + 15], shape.state.strains[4].as_slice());
-        assert_eq!(one.tendon_lengths[2 * i..2 * i + 2], shape.state.tendon_lengths);
-        assert_eq!(one.energy[i], shape.state.energy);
+        assert_eq!(of(Key::Tip)[16 * i..16 * i + 16], tip.to_row_major());
+        assert_eq!(of(Key::Frames)[16 * (6 * i + 5)..16 * (6 * i + 6)], tip.to_row_major());
+        assert_eq!(
+            &of(Key::Positions)[3 * (6 * i + 5)..3 * (6 * i + 6)],
+            tip.translation.as_slice()
+        );
+        assert_eq!(&of(Key::Strains)[15 * i + 12..15 * i + 15], shape.state.strains[4].as_slice());
+        assert_eq!(of(Key::TendonLengths)[2 * i..2 * i + 2], shape.state.tendon_lengths);
+        assert_eq!(of(Key::Energy)[i], shape.state.energy);
         let last = shape.tendon_points(&robot, 1)[5];
-        assert_eq!(&one.tendon_points[1][3 * (6 * i + 5)..3 * (6 * i + 6)], last.as_slice());
-        assert!(one.tensions[2 * i].is_nan());
+        assert_eq!(&of(Key::TendonPoints(1))[3 * (6 * i + 5)..3 * (6 * i + 6)], last.as_slice());
+        assert!(of(Key::Tensions)[2 * i].is_nan());
     }
 }
 
@@ -74,12 +70,12 @@ fn fields_that_were_not_wanted_are_empty() {
     let robot = robot();
     let plan = Plan::new(&robot).unwrap();
     let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
-    let fields = Fields { energy: true, ..Fields::default() };
     let pool = pool(None).unwrap();
-    let columns = solve_rows(&model, &rows(), 1001, fields, &pool, &Control::default());
+    let columns = solve_rows(&model, &rows(), 1001, &[Field::Energy], &pool, &Control::default());
     let columns = columns.unwrap().unwrap();
-    assert!(columns.tip.is_empty() && columns.frames.is_empty() && columns.strains.is_empty());
-    assert_eq!(columns.energy.len(), 1001);
+    assert_eq!(columns.columns.len(), 1);
+    assert!(columns.values(Key::Tip).is_none());
+    assert_eq!(columns.values(Key::Energy).unwrap().len(), 1001);
 }
 
 #[test]
@@ -127,12 +123,22 @@ fn empty_batches_and_robots_without_tendons_are_fine() {
     let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
     let pool = pool(Some(2)).unwrap();
     let columns = solve_rows(&model, &[], 0, ALL, &pool, &Control::default()).unwrap().unwrap();
-    assert!(columns.tip.is_empty() && columns.reports.is_empty());
+    assert!(columns.values(Key::Tip).unwrap().is_empty() && columns.reports.is_empty());
     let backbone = Backbone::new(BackboneSpec::straight(0.2, 5)).unwrap();
     let bare = Robot::new(backbone, vec![], None, None, None).unwrap();
     let plan = Plan::new(&bare).unwrap();
     let model = Linkage::new(&bare, &plan, LinkageSettings::default()).unwrap();
     let columns = solve_rows(&model, &[], 3, ALL, &pool, &Control::default()).unwrap().unwrap();
-    assert_eq!(columns.tip.len(), 48);
+    assert_eq!(columns.values(Key::Tip).unwrap().len(), 48);
     assert!(pool.current_num_threads() == 2 && tdcr::batch::pool(Some(0)).is_err());
+}
+
+#[test]
+fn fields_go_by_their_names() {
+    for field in Field::ALL {
+        assert_eq!(Field::named(field.as_str()), Ok(field));
+    }
+    let error = Field::named("shape").unwrap_err();
+    assert_eq!(error.argument, "fields");
+    assert!(error.expected.contains("tendon_points") && error.got == "'shape'");
 }

@@ -4,9 +4,9 @@ use numpy::PyUntypedArrayMethods;
 use pyo3::PyTypeInfo;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyList, PyTuple};
 
-use tdcr::batch::{Columns, Fields, pool, solve_rows};
+use tdcr::batch::{Field, Key, Solved, pool, solve_rows};
 use tdcr::constant_curvature::{self, ConstantCurvature, ConstantCurvatureSettings};
 use tdcr::linkage::{Linkage, LinkageSettings};
 use tdcr::model::Model;
@@ -186,6 +186,12 @@ fn own_settings<'a, 'py, T: PyTypeInfo>(
     })
 }
 
+/// Names of the fields a batch can have.
+#[pyfunction]
+pub(crate) fn _fields(py: Python<'_>) -> PyResult<Bound<'_, PyTuple>> {
+    PyTuple::new(py, Field::ALL.map(Field::as_str))
+}
+
 /// Columns of a batch by field name; `tdcr.forward_batch` is the face of it.
 #[pyfunction]
 #[pyo3(signature = (robot, displacements, *, model, settings, fields, threads, progress))]
@@ -212,16 +218,8 @@ pub(crate) fn _forward_batch<'py>(
         let expected = format!("shape (B, {tendons}), one column per tendon");
         return Err(wrong_shape("displacements", &expected, array.shape()));
     }
-    let wanted = Fields {
-        tip: fields.iter().any(|f| f == "tip"),
-        frames: fields.iter().any(|f| f == "frames"),
-        positions: fields.iter().any(|f| f == "positions"),
-        strains: fields.iter().any(|f| f == "strains"),
-        tendon_points: fields.iter().any(|f| f == "tendon_points"),
-        tendon_lengths: fields.iter().any(|f| f == "tendon_lengths"),
-        tensions: fields.iter().any(|f| f == "tensions"),
-        energy: fields.iter().any(|f| f == "energy"),
-    };
+    let fields = fields.iter().map(|name| Field::named(name)).collect::<Result<Vec<_>, _>>();
+    let fields = fields.map_err(|e| invalid(&e))?;
     let threads = optional("threads", threads, whole)?;
     let pool = pool(threads).map_err(|e| invalid(&e))?;
     let flat = values(&array)?;
@@ -230,54 +228,42 @@ pub(crate) fn _forward_batch<'py>(
             let plan = robot.get().linkage_plan().map_err(|e| invalid(&e))?;
             let model = Linkage::new(core, plan, settings).map_err(|e| invalid(&e))?;
             long_call::run(py, progress, |control| {
-                solve_rows(&model, flat, rows, wanted, &pool, control)
+                solve_rows(&model, flat, rows, &fields, &pool, control)
             })?
         }
         Choice::ConstantCurvature(settings) => {
             let plan = robot.get().constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
             let model = ConstantCurvature::new(core, plan);
             long_call::run(py, progress, |control| {
-                solve_rows(&model, flat, rows, wanted, &pool, control)
+                solve_rows(&model, flat, rows, &fields, &pool, control)
             })?
         }
     };
     // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
     let solved = solved.map_err(|e| invalid(&e))?.unwrap_or_default();
-    let answer = export(py, robot, wanted, solved)?;
+    let answer = export(py, &fields, solved)?;
     answer.set_item("displacements", frozen(py, flat.to_vec(), &[rows, tendons])?)?;
     Ok(answer)
 }
 
-fn export<'py>(
-    py: Python<'py>,
-    robot: &Bound<'py, Robot>,
-    wanted: Fields,
-    solved: Columns,
-) -> PyResult<Bound<'py, PyDict>> {
-    let core = &robot.get().0;
+fn export<'py>(py: Python<'py>, fields: &[Field], solved: Solved) -> PyResult<Bound<'py, PyDict>> {
     let rows = solved.reports.len();
-    let (n, tendons) = (core.backbone().subsegments(), core.tendons().len());
     let answer = PyDict::new(py);
-    let put = |wanted: bool, name: &str, values: Vec<f64>, shape: &[usize]| -> PyResult<()> {
-        if wanted {
-            answer.set_item(name, frozen(py, values, shape)?)?;
+    if fields.contains(&Field::TendonPoints) {
+        answer.set_item(Field::TendonPoints.as_str(), PyList::empty(py))?;
+    }
+    for column in solved.columns {
+        let shape: Vec<usize> = std::iter::once(rows).chain(column.shape).collect();
+        let array = frozen(py, column.values, &shape)?;
+        let name = column.key.field().as_str();
+        match column.key {
+            Key::TendonPoints(_) => {
+                if let Some(list) = answer.get_item(name)? {
+                    list.cast::<PyList>()?.append(array)?;
+                }
+            }
+            _ => answer.set_item(name, array)?,
         }
-        Ok(())
-    };
-    put(wanted.tip, "tip", solved.tip, &[rows, 4, 4])?;
-    put(wanted.frames, "frames", solved.frames, &[rows, n + 1, 4, 4])?;
-    put(wanted.positions, "positions", solved.positions, &[rows, n + 1, 3])?;
-    let width = solved.strains.len().checked_div(rows * n).unwrap_or(3);
-    put(wanted.strains, "strains", solved.strains, &[rows, n, width])?;
-    put(wanted.tendon_lengths, "tendon_lengths", solved.tendon_lengths, &[rows, tendons])?;
-    put(wanted.tensions, "tensions", solved.tensions, &[rows, tendons])?;
-    put(wanted.energy, "energy", solved.energy, &[rows])?;
-    if wanted.tendon_points {
-        let list = PyList::empty(py);
-        for (path, points) in core.paths().iter().zip(solved.tendon_points) {
-            list.append(frozen(py, points, &[rows, path.end() + 1, 3])?)?;
-        }
-        answer.set_item("tendon_points", list)?;
     }
     let mut statuses = Vec::with_capacity(rows);
     for report in &solved.reports {

@@ -30,7 +30,7 @@ mod _core {
         _arc_frames, _arc_from_displacements, _arc_jacobian, _displacements_from_arc,
     };
     #[pymodule_export]
-    use crate::forward::{_forward_batch, forward, jacobian};
+    use crate::forward::{_fields, _forward_batch, forward, jacobian};
     #[pymodule_export]
     use crate::robot::Robot;
     #[pymodule_export]

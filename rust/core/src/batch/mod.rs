@@ -1,7 +1,9 @@
 //! Many solves on all cores: every row kept, in order, the same on any number of threads.
 
+mod field;
 mod pool;
 mod rows;
 
+pub use field::{Field, Key};
 pub use pool::pool;
-pub use rows::{Columns, Control, Fields, solve_rows};
+pub use rows::{Column, Control, Solved, solve_rows};

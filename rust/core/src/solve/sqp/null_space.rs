@@ -109,34 +109,7 @@ impl<const N: usize, const M: usize> Frame<N, M> {
         at: &Linearization<N, M>,
         mut h: SMatrix<f64, N, N>,
     ) -> Option<Step<N, M>> {
-        // Into the adapted basis: H <- Q^T H Q, one symmetric rank-two update per reflection.
-        for j in 0..M {
-            let mut u = SVector::<f64, N>::zeros();
-            for k in j..N {
-                for i in 0..N {
-                    u[i] += h[(i, k)] * self.reflectors[(k, j)];
-                }
-            }
-            u *= self.scales[j];
-            let mut inner = 0.0;
-            for i in j..N {
-                inner += u[i] * self.reflectors[(i, j)];
-            }
-            inner *= 0.5 * self.scales[j];
-            for i in j..N {
-                u[i] -= inner * self.reflectors[(i, j)];
-            }
-            for k in j..N {
-                for i in 0..N {
-                    h[(i, k)] -= u[i] * self.reflectors[(k, j)];
-                }
-            }
-            for k in 0..N {
-                for i in j..N {
-                    h[(i, k)] -= self.reflectors[(i, j)] * u[k];
-                }
-            }
-        }
+        self.rotate(&mut h);
         let mut step = self.range_part(at);
         let mut right = SVector::<f64, N>::zeros();
         for i in M..N {
@@ -165,6 +138,38 @@ impl<const N: usize, const M: usize> Frame<N, M> {
             curvature,
             exact,
         })
+    }
+
+    /// Into the adapted basis: H <- Q^T H Q, one symmetric rank-two update per reflection.
+    #[inline(always)]
+    fn rotate(&self, h: &mut SMatrix<f64, N, N>) {
+        for j in 0..M {
+            let mut u = SVector::<f64, N>::zeros();
+            for k in j..N {
+                for i in 0..N {
+                    u[i] += h[(i, k)] * self.reflectors[(k, j)];
+                }
+            }
+            u *= self.scales[j];
+            let mut inner = 0.0;
+            for i in j..N {
+                inner += u[i] * self.reflectors[(i, j)];
+            }
+            inner *= 0.5 * self.scales[j];
+            for i in j..N {
+                u[i] -= inner * self.reflectors[(i, j)];
+            }
+            for k in j..N {
+                for i in 0..N {
+                    h[(i, k)] -= u[i] * self.reflectors[(k, j)];
+                }
+            }
+            for k in 0..N {
+                for i in j..N {
+                    h[(i, k)] -= self.reflectors[(i, j)] * u[k];
+                }
+            }
+        }
     }
 
     /// Range-space part of a step in the adapted basis: `R^T y = -c`.
