@@ -1,6 +1,6 @@
 //! Robots of several constant-curvature segments: the forward model.
 
-use nalgebra::{DMatrix, DVector, Matrix6xX, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix6xX, Vector2, Vector3};
 
 use super::arc::Arc;
 use crate::error::InvalidInput;
@@ -211,23 +211,30 @@ impl<'r> ConstantCurvature<'r> {
     /// Places the disks, and measures tendons along their arcs.
     fn place(&self, displacements: &[f64], work: &mut Workspace) {
         let Workspace { state, arcs, misfit, counted, .. } = work;
-        let positions = self.robot.backbone().arc_lengths();
         state.clear();
         let mut base = *self.robot.base();
         state.frames.push(base);
+        let lengths = self.robot.backbone().lengths();
         for (segment, arc) in self.plan.segments.iter().zip(arcs.iter()) {
-            let start = positions[segment.first];
-            for disk in segment.first + 1..=segment.last {
-                let share = (positions[disk] - start) / segment.rest_length;
-                state.frames.push(base.compose(&arc.frame(share)));
-                let step = (positions[disk] - positions[disk - 1]) / segment.rest_length;
-                state.strains.push(arc.rotation(step));
+            let mut frame = base;
+            let mut last: Option<(f64, Pose, Vector3<f64>)> = None;
+            for length in &lengths[segment.first..segment.last] {
+                let share = length / segment.rest_length;
+                // Steps of equal length along one arc are one motion.
+                let (step, turn) = match last {
+                    Some((same, step, turn)) if same == share => (step, turn),
+                    _ => (arc.frame(share), arc.rotation(share)),
+                };
+                last = Some((share, step, turn));
+                frame = frame.compose(&step);
+                state.frames.push(frame);
+                state.strains.push(turn);
                 if self.plan.settings.extensible {
                     state.elongations.push(arc.length / segment.rest_length - 1.0);
                 }
             }
             base = base.compose(&arc.frame(1.0));
-            // The segment ends at s = ell exactly, whatever the shares round to.
+            // The segment ends at s = ell exactly, whatever the steps round to.
             if let Some(last) = state.frames.last_mut() {
                 *last = base;
             }
