@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tdcr::constant_curvature::{
     Arc, ConstantCurvature, ConstantCurvatureSettings, Coupling, Length, Mapping, Plan, Workspace,
-    displacements, tip_derivative,
+    displacements, frames, tip_derivative,
 };
 use tdcr::lie::{Pose, so3};
 use tdcr::model::Model;
@@ -181,6 +181,28 @@ fn arcs_are_those_of_the_source() {
     for kappa in [0.0, 1e-300, 1e-12] {
         let frame = Arc::new(kappa, 1.0, 0.2).frame(0.5);
         assert!((frame.translation - Vector3::new(0.0, 0.0, 0.1)).amax() < 1e-14);
+    }
+}
+
+/// Base and tip of every segment are among the frames, and the tip is at s = ell to the bit.
+#[test]
+fn frames_along_a_chain() {
+    let arcs = [Arc::new(8.0, 0.3, 0.06), Arc::new(0.0, 0.0, 0.1), Arc::new(30.0, -2.0, 0.2)];
+    for points in [2, 3, 10, 500] {
+        let mut along = Vec::new();
+        frames(&Pose::identity(), &arcs, points, &mut along);
+        assert_eq!(along.len(), 3 * points);
+        let mut base = Pose::identity();
+        for (i, arc) in arcs.iter().enumerate() {
+            for k in 0..points {
+                let exact = base.compose(&arc.frame(k as f64 / (points - 1) as f64));
+                let got = along[i * points + k];
+                assert!((got.translation - exact.translation).amax() < 1e-14, "{points} {i} {k}");
+                assert!((got.rotation - exact.rotation).amax() < 1e-13);
+            }
+            base = base.compose(&arc.frame(1.0));
+            assert_eq!(along[(i + 1) * points - 1], base);
+        }
     }
 }
 

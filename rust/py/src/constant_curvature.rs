@@ -4,7 +4,7 @@ use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
 use tdcr::InvalidInput;
-use tdcr::constant_curvature::{Arc, Length, Mapping, tip_derivative};
+use tdcr::constant_curvature::{Arc, Length, Mapping, frames, tip_derivative};
 use tdcr::lie::Pose;
 use tdcr::robot::rigid_motion;
 
@@ -140,15 +140,9 @@ pub(crate) fn _arc_frames(
         let expected = "at least 2 frames per segment (base and tip)";
         return Err(invalid(&InvalidInput::new("points", expected, points)));
     }
-    let mut frame = pose("base", base)?;
-    let mut frames = Vec::new();
-    for arc in &arcs {
-        for i in 0..points {
-            frames.push(frame.compose(&arc.frame(i as f64 / (points - 1) as f64)));
-        }
-        frame = frame.compose(&arc.frame(1.0));
-    }
-    frozen_frames(py, &frames)
+    let mut along = Vec::new();
+    frames(&pose("base", base)?, &arcs, points, &mut along);
+    frozen_frames(py, &along)
 }
 
 /// Derivative (6, 3m) of the tool's velocity by kappa, phi and ell of every arc.

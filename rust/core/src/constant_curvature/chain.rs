@@ -287,6 +287,25 @@ impl<'r> ConstantCurvature<'r> {
     }
 }
 
+/// Frames along a chain of arcs: `points` (at least 2) evenly spaced on each, its base and its tip
+/// included, from the frame of the first base.
+pub fn frames(base: &Pose, arcs: &[Arc], points: usize, out: &mut Vec<Pose>) {
+    out.clear();
+    let mut base = *base;
+    for arc in arcs {
+        let step = arc.frame(1.0 / (points.max(2) - 1) as f64);
+        let mut frame = base;
+        out.push(frame);
+        for _ in 2..points {
+            frame = frame.compose(&step);
+            out.push(frame);
+        }
+        // At s = ell exactly, whatever the steps round to.
+        base = base.compose(&arc.frame(1.0));
+        out.push(base);
+    }
+}
+
 /// Velocity of the tool at the end of a chain of arcs (translation, then rotation, world axes) by every
 /// arc's bending vector and length, (6, 3m).
 #[must_use]

@@ -6,7 +6,7 @@ mod mapping;
 
 pub use arc::Arc;
 pub use chain::{
-    ConstantCurvature, ConstantCurvatureSettings, Coupling, Plan, Workspace, displacements,
+    ConstantCurvature, ConstantCurvatureSettings, Coupling, Plan, Workspace, displacements, frames,
     tip_derivative,
 };
 pub use mapping::{Fit, Length, Mapping};
