@@ -79,7 +79,7 @@ python-tests: package
 runs: package
 	$(BIN)/tdcr demo --output target/runs/demo
 	for script in examples/*.py; do $(BIN)/python $$script --output target/runs/figures || exit 1; done
-	$(BIN)/python benches/peers/linkage.py --quick
+	for script in benches/peers/*.py; do $(BIN)/python $$script --quick || exit 1; done
 
 figures: $(VENV)/installed
 	for script in examples/*.py; do $(BIN)/python $$script --output examples/figures || exit 1; done
@@ -87,7 +87,7 @@ figures: $(VENV)/installed
 bench: $(VENV)/installed $(VENV)/developed
 	cargo bench
 	$(BIN)/python benches/python_calls.py
-	$(BIN)/python benches/peers/linkage.py
+	for script in benches/peers/*.py; do $(BIN)/python $$script || exit 1; done
 
 clean:
 	rm -rf $(VENV) dist demo target

@@ -32,7 +32,8 @@ use crate::shape::Shape;
 ///     "linkage": a chain of four-bar (one tendon) or seven-bar linkages (two), the constrained
 ///     minimum of the coupler angles (Ashwin & Ghosal, "Forward kinematics of cable-driven
 ///     continuum robot using optimization method"). The two most-pulled tendons on different lines
-///     through the centre drive; the bounds of the others are checked. Straight backbones only.
+///     through the centre drive and are kept at their lengths (a message names one that would have
+///     to push); the bounds of the others are checked. Straight backbones only.
 ///     "constant_curvature": every segment an arc, by least squares over all its tendons
 ///     (opencontinuumrobotics.com). Bilateral: displacements count as given, but for free tendons and
 ///     the only, released one of a segment. Straight backbones and straight routing only.

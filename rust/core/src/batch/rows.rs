@@ -36,11 +36,11 @@ impl Column {
     fn new<M: Model>(model: &M, key: Key, rows: usize) -> Result<Self, InvalidInput> {
         let shape = key.shape(model.robot(), model.strain_width());
         let width: usize = shape.iter().product();
-        let mut values = Vec::new();
         let size = rows.saturating_mul(width);
-        values.try_reserve_exact(size).map_err(|_| too_large(rows, width))?;
-        values.resize(size, 0.0);
-        Ok(Self { key, shape, values })
+        // Asked for in earnest only when it can be had; then as zero pages, which the threads that
+        // fill them touch first.
+        Vec::<f64>::new().try_reserve_exact(size).map_err(|_| too_large(rows, width))?;
+        Ok(Self { key, shape, values: vec![0.0; size] })
     }
 }
 
