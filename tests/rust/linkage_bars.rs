@@ -135,7 +135,7 @@ fn random_pair(u: &mut impl FnMut(f64, f64) -> f64, half: f64) -> ([Hole; 2], f6
     }
 }
 
-/// DESIGN: positions within 1e-12 of the length for pulls of at least 1e-3 of the radius, 1e-16 a/delta
+/// Within 1e-12 of the length for pulls of at least 1e-3 of the radius, 1e-15 a/delta
 /// below; from the linear start and from random ones around the answer.
 #[test]
 fn seven_bars_meet_the_closed_form() {
