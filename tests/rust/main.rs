@@ -12,6 +12,7 @@ mod constant_curvature;
 mod lie;
 mod linkage_bars;
 mod linkage_chain;
+mod linkage_drive;
 mod linkage_random;
 mod robot;
 

@@ -2,11 +2,12 @@
 
 mod arc;
 mod chain;
+mod kinematics;
 mod mapping;
 
 pub use arc::Arc;
 pub use chain::{
-    ConstantCurvature, ConstantCurvatureSettings, Coupling, Plan, Workspace, displacements, frames,
-    tip_derivative,
+    ConstantCurvature, ConstantCurvatureSettings, Coupling, Plan, Workspace, displacements,
 };
+pub use kinematics::{frames, tip_derivative};
 pub use mapping::{Fit, Length, Mapping};
