@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Sized
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -221,7 +221,8 @@ def _told(
 
         columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         with Progress(*columns, console=Console(stderr=True)) as bar:
-            task = bar.add_task("forward_batch", total=len(np.asarray(displacements)))
+            total = len(displacements) if isinstance(displacements, Sized) else None
+            task = bar.add_task("forward_batch", total=total)
             yield lambda done: bar.update(task, completed=done)
     else:
         yield None

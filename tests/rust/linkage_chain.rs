@@ -1,43 +1,21 @@
-//! The chain of linkages from base to tip: closed form, order, bounds, symmetries, choice of tendons.
+//! The chain of linkages from base to tip: closed form, order, bounds, symmetries.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use tdcr::Status;
 use tdcr::linkage::{Linkage, LinkageSettings, Plan};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::{InvalidInput, Shape, Status};
 
-const FREE: f64 = f64::INFINITY;
-
-fn robot(length: f64, n: usize, tendons: Vec<Tendon>) -> Robot {
-    let backbone = Backbone::new(BackboneSpec::straight(length, n)).unwrap();
-    Robot::new(backbone, tendons, None, None, None).unwrap()
-}
-
-fn straight(azimuths: &[f64], radius: f64) -> Vec<Tendon> {
-    azimuths.iter().map(|azimuth| Tendon::straight(*azimuth, radius).unwrap()).collect()
-}
+use crate::common::{FREE, robot, solve, straight, tip, try_solve};
 
 fn ending(azimuth: f64, radius: f64, end: usize) -> Tendon {
     let routing =
         Routing::Angles { azimuth: PerDisk::Same(azimuth), radius: PerDisk::Same(radius) };
     Tendon::new(routing, Some(end), None, None).unwrap()
-}
-
-fn try_solve(robot: &Robot, displacements: &[f64]) -> Result<Shape, InvalidInput> {
-    let plan = Plan::new(robot)?;
-    Linkage::new(robot, &plan, LinkageSettings::default())?.shape(displacements)
-}
-
-fn solve(robot: &Robot, displacements: &[f64]) -> Shape {
-    try_solve(robot, displacements).unwrap()
-}
-
-fn tip(shape: &Shape) -> Vector3<f64> {
-    shape.state.frames.last().unwrap().translation
 }
 
 /// Disk k of a chain of n links of equal bend: link i points along (i + 1/2) beta, and the sum of the

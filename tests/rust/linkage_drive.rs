@@ -2,35 +2,9 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use nalgebra::Vector3;
-use tdcr::linkage::{Linkage, LinkageSettings, Plan};
-use tdcr::model::Model;
-use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
-use tdcr::{InvalidInput, Shape, Status};
+use tdcr::Status;
 
-const FREE: f64 = f64::INFINITY;
-
-fn robot(length: f64, n: usize, tendons: Vec<Tendon>) -> Robot {
-    let backbone = Backbone::new(BackboneSpec::straight(length, n)).unwrap();
-    Robot::new(backbone, tendons, None, None, None).unwrap()
-}
-
-fn straight(azimuths: &[f64], radius: f64) -> Vec<Tendon> {
-    azimuths.iter().map(|azimuth| Tendon::straight(*azimuth, radius).unwrap()).collect()
-}
-
-fn try_solve(robot: &Robot, displacements: &[f64]) -> Result<Shape, InvalidInput> {
-    let plan = Plan::new(robot)?;
-    Linkage::new(robot, &plan, LinkageSettings::default())?.shape(displacements)
-}
-
-fn solve(robot: &Robot, displacements: &[f64]) -> Shape {
-    try_solve(robot, displacements).unwrap()
-}
-
-fn tip(shape: &Shape) -> Vector3<f64> {
-    shape.state.frames.last().unwrap().translation
-}
+use crate::common::{FREE, robot, solve, straight, tip, try_solve};
 
 #[test]
 fn the_two_most_pulled_tendons_drive_and_the_others_are_checked() {

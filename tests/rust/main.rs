@@ -8,6 +8,7 @@
 )]
 
 mod batch;
+mod common;
 mod constant_curvature;
 mod lie;
 mod linkage_bars;

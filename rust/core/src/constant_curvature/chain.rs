@@ -126,17 +126,31 @@ impl Plan {
         }
     }
 
-    /// The inverse over the tendons that count; columns of the others are zero.
-    fn masked_inverse(&self, counted: &[bool]) -> DMatrix<f64> {
-        let mut matrix = self.matrix.clone();
-        for (k, counts) in counted.iter().enumerate() {
-            if !counts {
-                matrix.row_mut(k).fill(0.0);
-            }
+    /// Makes the inverse over the tendons that count, unless it is at hand; columns of the others are
+    /// zero.
+    fn remember(&self, counted: &[bool], masked: &mut Option<Masked>) {
+        let at_hand = masked.as_ref().is_some_and(|(pattern, _)| pattern == counted);
+        if at_hand || counted.iter().all(|counts| *counts) {
+            return;
         }
-        PseudoInverse::new(&matrix).matrix
+        let mut matrix = self.matrix.clone();
+        for (k, _) in counted.iter().enumerate().filter(|(_, counts)| !**counts) {
+            matrix.row_mut(k).fill(0.0);
+        }
+        *masked = Some((counted.to_vec(), PseudoInverse::new(&matrix).matrix));
+    }
+
+    /// The inverse over the tendons that count, after [`Plan::remember`].
+    fn inverse_for<'a>(&'a self, counted: &[bool], masked: Option<&'a Masked>) -> &'a DMatrix<f64> {
+        match masked {
+            Some((pattern, inverse)) if pattern == counted => inverse,
+            _ => &self.inverse.matrix,
+        }
     }
 }
+
+/// A pattern of counted tendons and the inverse over them.
+type Masked = (Vec<bool>, DMatrix<f64>);
 
 /// Buffers of a solve.
 #[derive(Clone, Debug, Default)]
@@ -148,7 +162,7 @@ pub struct Workspace {
     misfit: Vec<f64>,
     counted: Vec<bool>,
     /// The inverse for the last pattern of counted tendons that was not "all".
-    masked: Option<(Vec<bool>, DMatrix<f64>)>,
+    masked: Option<Masked>,
 }
 
 impl Workspace {
@@ -182,15 +196,8 @@ impl<'r> ConstantCurvature<'r> {
         let plan = self.plan;
         let width = unknowns(plan.settings.extensible);
         plan.counted(displacements, &mut work.counted);
-        let all = work.counted.iter().all(|counts| *counts);
-        if !all && work.masked.as_ref().is_none_or(|(pattern, _)| *pattern != work.counted) {
-            let inverse = plan.masked_inverse(&work.counted);
-            work.masked = Some((work.counted.clone(), inverse));
-        }
-        let inverse = match &work.masked {
-            Some((_, inverse)) if !all => inverse,
-            _ => &plan.inverse.matrix,
-        };
+        plan.remember(&work.counted, &mut work.masked);
+        let inverse = plan.inverse_for(&work.counted, work.masked.as_ref());
         work.arcs.clear();
         let mut sound = true;
         for (i, segment) in plan.segments.iter().enumerate() {
@@ -279,12 +286,7 @@ impl<'r> ConstantCurvature<'r> {
                     .copy_from(&(by_arcs.column(3 * i + j) * scale));
             }
         }
-        let inverse = if work.counted.iter().all(|counts| *counts) {
-            self.plan.inverse.matrix.clone()
-        } else {
-            self.plan.masked_inverse(&work.counted)
-        };
-        by_unknowns * inverse
+        by_unknowns * self.plan.inverse_for(&work.counted, work.masked.as_ref())
     }
 }
 

@@ -158,12 +158,8 @@ impl<'r> Linkage<'r> {
         // Those that drive on their whole way meet their length as a constraint, to the solver's
         // tolerance.
         let drives = move |k: usize, end: usize| {
-            let way = self.plan.runs.iter().zip(drives).take_while(|(run, _)| run.last <= end);
-            way.into_iter().all(|(_, drive)| match drive {
-                Drive::None => false,
-                Drive::One(a) => *a == k,
-                Drive::Two(a, b) => *a == k || *b == k,
-            })
+            let mut way = self.plan.runs.iter().zip(drives).take_while(|(run, _)| run.last <= end);
+            way.all(|(_, drive)| drive.contains(k))
         };
         let bound = move |k: usize, path: &Path| {
             path.rest_length * (1.0 + BOUND_TOLERANCE) + displacements[k]
@@ -197,10 +193,10 @@ impl Model for Linkage<'_> {
         state.tensions.resize(displacements.len(), f64::NAN);
         state.energy =
             state.strains.iter().enumerate().map(|(i, w)| backbone.strain_energy(i, w)).sum();
-        let finite = |pose: &Pose| pose.translation.iter().all(|x| x.is_finite());
-        if work.failure.is_none() && !work.state.frames.iter().all(finite) {
+        let lost = |pose: &Pose| !pose.translation.iter().all(|x| x.is_finite());
+        if let (None, Some(disk)) = (&work.failure, work.state.frames.iter().position(lost)) {
             report.status = Status::NumericalError;
-            work.failure = Some(Failure::Solve { disk: 1, ending: Ending::NumericalError });
+            work.failure = Some(Failure::Solve { disk, ending: Ending::NumericalError });
         }
         if work.failure.is_none()
             && self.overlong(displacements, &work.drives, &work.state).next().is_some()

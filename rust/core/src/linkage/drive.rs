@@ -15,6 +15,17 @@ pub(super) enum Drive {
     Two(usize, usize),
 }
 
+impl Drive {
+    /// Whether a tendon is part of the linkage.
+    pub(super) fn contains(self, tendon: usize) -> bool {
+        match self {
+            Self::None => false,
+            Self::One(a) => a == tendon,
+            Self::Two(a, b) => a == tendon || b == tendon,
+        }
+    }
+}
+
 /// Subsegments `first..last` that the same tendons pass.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
@@ -116,9 +127,9 @@ impl Choice<'_> {
         // stretched, the one that asks for most of it decides.
         let taut = (0..tendons)
             .filter(|&k| k != first && stand(k) == Stand::Apart)
-            .filter(|&k| self.overstretch(run, first, k).share > BOUND_TOLERANCE)
-            .map(|k| (k, self.overstretch(run, first, k).sideways))
-            .max_by(|a, b| a.1.total_cmp(&b.1));
+            .map(|k| (k, self.overstretch(run, first, k)))
+            .filter(|(_, asked)| asked.share > BOUND_TOLERANCE)
+            .max_by(|a, b| a.1.sideways.total_cmp(&b.1.sideways));
         Ok(taut.map_or(Drive::One(first), |(second, _)| Drive::Two(first, second)))
     }
 

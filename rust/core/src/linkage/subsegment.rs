@@ -44,27 +44,30 @@ pub(super) enum Obstacle {
 }
 
 impl Question {
+    /// The holes that carry a tendon.
+    fn pulled(&self) -> &[Hole] {
+        match self {
+            Self::Straight => &[],
+            Self::Planar(hole) => std::slice::from_ref(hole),
+            Self::Spatial(holes) => &holes[..1],
+            Self::Pair(holes) => holes,
+        }
+    }
+
     /// The bound of the exact answer, where there is one (Ashwin & Ghosal, eq. 8, for one tendon;
     /// `docs/linkage.md` for two), and the length of the pieces.
     pub(super) fn obstacle(&self) -> Option<Obstacle> {
-        let (holes, bound) = match self {
-            Self::Straight => return None,
-            Self::Planar(hole) => {
-                let bound = hole.is_alike().then(|| 0.5 * hole.pull / hole.upper.norm());
-                (std::slice::from_ref(hole), bound)
-            }
-            Self::Spatial(holes) => (&holes[..1], None),
-            Self::Pair(holes) => {
-                let bound = holes.iter().all(Hole::is_alike).then(|| {
-                    let (c, s) = linear_bend(&holes.each_ref().map(|hole| (hole.upper, hole.pull)));
-                    0.5 * (c * c + s * s).sqrt()
-                });
-                (&holes[..], bound)
-            }
-        };
-        if let Some(hole) = holes.iter().position(|hole| hole.pull >= hole.rest) {
+        if let Some(hole) = self.pulled().iter().position(|hole| hole.pull >= hole.rest) {
             return Some(Obstacle::Piece(hole));
         }
+        let bound = match self {
+            Self::Planar(hole) if hole.is_alike() => Some(0.5 * hole.pull / hole.upper.norm()),
+            Self::Pair(holes) if holes.iter().all(Hole::is_alike) => {
+                let (c, s) = linear_bend(&holes.each_ref().map(|hole| (hole.upper, hole.pull)));
+                Some(0.5 * (c * c + s * s).sqrt())
+            }
+            _ => None,
+        };
         // Written so that a NaN counts as out of reach.
         let within = |half: f64| half < 1.0 - BEND_MARGIN;
         bound.is_some_and(|half| !within(half)).then_some(Obstacle::Bend)
@@ -109,17 +112,11 @@ impl Question {
 
     /// Largest relative error of a tendon piece at a pose.
     fn violation(&self, pose: &Pose) -> f64 {
-        let holes = match self {
-            Self::Straight => return 0.0,
-            Self::Planar(hole) => std::slice::from_ref(hole),
-            Self::Spatial(holes) => &holes[..1],
-            Self::Pair(holes) => &holes[..],
-        };
         let error = |hole: &Hole| {
             let piece = (pose.link + pose.rotation() * hole.upper - hole.lower).norm();
             (piece - (hole.rest - hole.pull)).abs() / hole.rest
         };
-        holes.iter().map(error).fold(0.0, f64::max)
+        self.pulled().iter().map(error).fold(0.0, f64::max)
     }
 }
 
@@ -180,13 +177,41 @@ pub fn solve_seven_bar<const M: usize>(
     if found.ending == Ending::Converged {
         return found;
     }
-    in_steps(found, settings, |share, from| {
+    let mut found = in_steps(found, settings, |share, from| {
         let pulled = holes.map(|hole| Hole { pull: share * hole.pull, ..hole });
         let problem = SevenBar::<M>::new(&pulled);
         let pose = from.map_or_else(|| problem.start(), |point: Point| point.pose);
         (problem, problem.point(pose))
-    })
+    });
+    // Out of reach from one start is not out of reach: others before it is said.
+    for (bend, towards) in OTHER_STARTS {
+        if found.ending == Ending::Converged {
+            break;
+        }
+        let start = problem.point(Pose::bent(bend, towards * std::f64::consts::PI));
+        let other = sqp::minimize(&problem, start, settings);
+        let iterations = found.iterations + other.iterations;
+        let better = if other.ending == Ending::Converged { other } else { found };
+        found = Solution { iterations, ..better };
+    }
+    found
 }
+
+/// Bends \[rad\] and where they point \[half turns\], tried before a pull is called out of reach.
+const OTHER_STARTS: [(f64, f64); 12] = [
+    (0.5, 0.0),
+    (0.5, 0.5),
+    (0.5, 1.0),
+    (0.5, -0.5),
+    (1.5, 0.25),
+    (1.5, 0.75),
+    (1.5, -0.75),
+    (1.5, -0.25),
+    (2.5, 0.0),
+    (2.5, 0.5),
+    (2.5, 1.0),
+    (2.5, -0.5),
+];
 
 /// Steps of the fallback along the pull.
 const STEPS: usize = 8;
