@@ -5,7 +5,8 @@
 //!
 //! Rooms, from the bottom up: [`lie`] (rotations and rigid motions), [`solve`] (solvers that know no
 //! robots), [`robot`] (what a robot is), [`model`] (what every forward model offers), [`linkage`]
-//! (the linkage model), [`constant_curvature`], [`batch`] (many solves on all cores).
+//! (the linkage model), [`constant_curvature`], [`batch`] (many solves on all cores), [`inverse`] (from targets to
+//! displacements).
 //!
 //! ```
 //! use tdcr::linkage::{Linkage, LinkageSettings, Plan};
@@ -29,6 +30,7 @@
 pub mod batch;
 pub mod constant_curvature;
 pub mod error;
+pub mod inverse;
 pub mod lie;
 pub mod linkage;
 pub mod model;

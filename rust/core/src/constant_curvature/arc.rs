@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Matrix6x3, Vector2, Vector3};
 
-use crate::lie::{Pose, so3};
+use super::bent::Bent;
+use crate::lie::Pose;
 
 /// An arc by its bending vector and its length. The bending vector `kappa * ell * (cos phi, sin phi)`
 /// is smooth where the arc is straight, where `phi` is not.
@@ -48,29 +49,20 @@ impl Arc {
     /// `Rz(phi) [Ry(kappa s) | p(s)] Rz(-phi)`, finite and smooth where it is straight.
     #[must_use]
     pub fn frame(&self, share: f64) -> Pose {
-        let rotation = self.rotation(share);
-        Pose {
-            rotation: so3::exp(&rotation),
-            translation: so3::left_jacobian(&rotation).column(2) * (self.length * share),
-        }
+        Bent::new(self.bend * share).frame(self.length * share)
     }
 
     /// Velocity of the arc's end (translation, then rotation, axes of its base) by the bending vector
     /// and the length \[columns: m and rad per rad, per rad, per m\].
     #[must_use]
     pub fn derivative(&self) -> Matrix6x3<f64> {
-        let rotation = self.rotation(1.0);
-        let jacobian = so3::left_jacobian(&rotation);
-        let moved = so3::left_jacobian_derivative(&rotation, &Vector3::z()) * self.length;
-        // bend.x turns about +y, bend.y about -x.
-        let columns = |m: &Matrix3<f64>| (m.column(1).into_owned(), -m.column(0));
-        let ((v_x, v_y), (w_x, w_y)) = (columns(&moved), columns(&jacobian));
+        let bent = Bent::new(self.bend);
         let mut out = Matrix6x3::zeros();
-        out.fixed_view_mut::<3, 1>(0, 0).copy_from(&v_x);
-        out.fixed_view_mut::<3, 1>(0, 1).copy_from(&v_y);
-        out.fixed_view_mut::<3, 1>(0, 2).copy_from(&jacobian.column(2));
-        out.fixed_view_mut::<3, 1>(3, 0).copy_from(&w_x);
-        out.fixed_view_mut::<3, 1>(3, 1).copy_from(&w_y);
+        for (j, (moved, turned)) in bent.moved().iter().zip(bent.turned()).enumerate() {
+            out.fixed_view_mut::<3, 1>(0, j).copy_from(&(moved * self.length));
+            out.fixed_view_mut::<3, 1>(3, j).copy_from(&turned);
+        }
+        out.fixed_view_mut::<3, 1>(0, 2).copy_from(&bent.end());
         out
     }
 

@@ -46,12 +46,13 @@ pub struct ConstantCurvatureSettings {
 
 /// A segment: subsegments `first..last`, the disks where tendons end.
 #[derive(Clone, Debug)]
-struct Segment {
+pub(crate) struct Segment {
     first: usize,
     last: usize,
-    rest_length: f64,
+    /// Length at rest \[m\].
+    pub(crate) rest_length: f64,
     /// Tendons that end at its tip.
-    own: Vec<usize>,
+    pub(crate) own: Vec<usize>,
 }
 
 /// What the model knows of a robot before any displacement.
@@ -110,6 +111,44 @@ impl Plan {
         }
         let inverse = PseudoInverse::new(&matrix);
         Ok(Self { segments, settings, scale, matrix, inverse })
+    }
+
+    /// Segments, base first.
+    pub(crate) fn segments(&self) -> impl ExactSizeIterator<Item = &Segment> {
+        self.segments.iter()
+    }
+
+    /// Number of segments.
+    #[must_use]
+    pub fn segment_count(&self) -> usize {
+        self.segments.len()
+    }
+
+    /// A segment.
+    pub(crate) fn segment(&self, i: usize) -> &Segment {
+        &self.segments[i]
+    }
+
+    /// Unknowns per segment: its bending vector, and its length when it is extensible.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        unknowns(self.settings.extensible)
+    }
+
+    /// Change of each tendon's length by the bending vectors \[m/rad\] and the elongations of all
+    /// segments, one row per tendon.
+    pub(crate) fn by_unknown(&self, tendon: usize, unknown: usize) -> f64 {
+        let entry = self.matrix[(tendon, unknown)];
+        if unknown % self.width() < 2 { entry * self.scale } else { entry }
+    }
+
+    /// Bending energy of a segment over half its squared angle.
+    pub(crate) fn stiffness(&self, robot: &Robot, segment: &Segment) -> f64 {
+        let backbone = robot.backbone();
+        let lengths = &backbone.lengths()[segment.first..segment.last];
+        let pieces = (segment.first..).zip(lengths);
+        let sum: f64 = pieces.map(|(j, length)| backbone.bending_stiffness(j) * length).sum();
+        sum / segment.rest_length.powi(2)
     }
 
     /// Tendons that count: not free, and not the only, released one of its segment.

@@ -1,6 +1,7 @@
 //! Constant curvature: every segment an arc of a circle (opencontinuumrobotics.com).
 
 mod arc;
+pub(crate) mod bent;
 mod chain;
 mod kinematics;
 mod mapping;

@@ -1,4 +1,8 @@
 //! Solvers: they see functions, gradients and block structure, never robots.
 
+pub mod fit;
+mod least;
 pub mod least_squares;
+pub mod quadratic;
+pub mod region;
 pub mod sqp;

@@ -1,0 +1,118 @@
+//! An arc of unit length as a function of its bending vector, with first and second derivatives.
+//!
+//! The rotation vector `w = (-y, x, 0)` lies in the base plane, which leaves few terms of the general maps
+//! of `lie::so3`: with `a = sin t / t`, `b = (1 - cos t) / t²`, `c = (t - sin t) / t³` at the angle
+//! `t = |(x, y)|`, the arc ends at `(x b, y b, a)`.
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use crate::lie::Pose;
+use crate::lie::coefficients::Angle;
+
+/// The arc and the coefficients that everything else is made of.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bent {
+    x: f64,
+    y: f64,
+    a: f64,
+    b: f64,
+    c: f64,
+    /// `b'(t) / t`.
+    b_slope: f64,
+}
+
+/// Second derivatives.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Second {
+    /// Of the end, by x twice, by x and y, by y twice.
+    pub(crate) end: [Vector3<f64>; 3],
+    /// `turned[i][j]`: derivative of the i-th angular velocity by the j-th component.
+    pub(crate) turned: [[Vector3<f64>; 2]; 2],
+}
+
+impl Bent {
+    #[inline(always)]
+    pub(crate) fn new(bend: Vector2<f64>) -> Self {
+        let angle = Angle::of_square(bend.norm_squared());
+        Self {
+            x: bend.x,
+            y: bend.y,
+            a: angle.a(),
+            b: angle.b(),
+            c: angle.c(),
+            b_slope: angle.b_slope(),
+        }
+    }
+
+    /// Rotation of the end.
+    #[inline(always)]
+    #[rustfmt::skip] // the matrix looks like one
+    pub(crate) fn rotation(&self) -> Matrix3<f64> {
+        let Self { x, y, a, b, .. } = *self;
+        Matrix3::new(
+            1.0 - b * x * x, -b * x * y, a * x,
+            -b * x * y, 1.0 - b * y * y, a * y,
+            -a * x, -a * y, 1.0 - b * (x * x + y * y),
+        )
+    }
+
+    /// Place of the end.
+    #[inline(always)]
+    pub(crate) fn end(&self) -> Vector3<f64> {
+        Vector3::new(self.x * self.b, self.y * self.b, self.a)
+    }
+
+    /// Frame of the end of an arc of this length.
+    #[inline(always)]
+    pub(crate) fn frame(&self, length: f64) -> Pose {
+        Pose { rotation: self.rotation(), translation: self.end() * length }
+    }
+
+    /// Derivatives of the end by x and by y.
+    #[inline(always)]
+    pub(crate) fn moved(&self) -> [Vector3<f64>; 2] {
+        let Self { x, y, b, c, b_slope, .. } = *self;
+        // a'(t) / t = c - b.
+        let (cross, a_slope) = (x * y * b_slope, c - b);
+        [
+            Vector3::new(b + x * x * b_slope, cross, x * a_slope),
+            Vector3::new(cross, b + y * y * b_slope, y * a_slope),
+        ]
+    }
+
+    /// Angular velocities of the end, base axes, by x and by y: the columns of the left Jacobian.
+    #[inline(always)]
+    pub(crate) fn turned(&self) -> [Vector3<f64>; 2] {
+        let Self { x, y, b, c, .. } = *self;
+        [
+            Vector3::new(-c * x * y, 1.0 - c * y * y, -b * y),
+            Vector3::new(c * x * x - 1.0, c * x * y, b * x),
+        ]
+    }
+
+    /// Second derivatives.
+    #[rustfmt::skip] // the vectors are read side by side
+    pub(crate) fn second(&self) -> Second {
+        let Self { x, y, b, c, b_slope: b1, .. } = *self;
+        let angle = Angle::of_square(x * x + y * y);
+        let (b2, c1) = (angle.b_bend(), angle.c_slope());
+        let (a1, a2) = (c - b, c1 - b1);
+        Second {
+            end: [
+                Vector3::new(x * (3.0 * b1 + x * x * b2), y * (b1 + x * x * b2), a1 + x * x * a2),
+                Vector3::new(y * (b1 + x * x * b2), x * (b1 + y * y * b2), x * y * a2),
+                Vector3::new(x * (b1 + y * y * b2), y * (3.0 * b1 + y * y * b2), a1 + y * y * a2),
+            ],
+            turned: [
+                [
+                    Vector3::new(-y * (c + x * x * c1), -x * y * y * c1, -x * y * b1),
+                    Vector3::new(-x * (c + y * y * c1), -y * (2.0 * c + y * y * c1), -b - y * y * b1),
+                ],
+                [
+                    Vector3::new(x * (2.0 * c + x * x * c1), y * (c + x * x * c1), b + x * x * b1),
+                    Vector3::new(x * x * y * c1, x * (c + y * y * c1), x * y * b1),
+                ],
+            ],
+        }
+    }
+}

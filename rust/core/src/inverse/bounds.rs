@@ -1,0 +1,202 @@
+//! What an inverse may use, and the region of unknowns it leaves.
+
+use nalgebra::DMatrix;
+
+use crate::constant_curvature::Plan;
+use crate::error::InvalidInput;
+use crate::solve::region::{Disc, Region};
+
+/// Lowest and highest values, one pair for all or one for each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Range {
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+}
+
+impl Range {
+    /// From lowest and highest values; a single one serves all. Infinite is no bound.
+    ///
+    /// # Errors
+    /// `InvalidInput` for NaN, a lower bound above the upper one, or sequences of different lengths.
+    pub fn new(argument: &str, lower: Vec<f64>, upper: Vec<f64>) -> Result<Self, InvalidInput> {
+        let (few, many) = (lower.len().min(upper.len()), lower.len().max(upper.len()));
+        if few == 0 || (few != 1 && few != many) {
+            let got = format!("{} lower and {} upper ones", lower.len(), upper.len());
+            let expected = "one bound for all or as many lower as upper bounds";
+            return Err(InvalidInput::new(argument, expected, got));
+        }
+        let range = Self { lower, upper };
+        for k in 0..many {
+            let (lower, upper) = range.at(k);
+            if lower.is_nan() || upper.is_nan() {
+                return Err(InvalidInput::new(argument, "bounds that are numbers", "NaN"));
+            }
+            if lower > upper || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
+                let got = format!("[{lower:?}, {upper:?}]");
+                return Err(InvalidInput::new(argument, "a lower bound below the upper", got));
+            }
+        }
+        Ok(range)
+    }
+
+    /// The bounds of one.
+    #[must_use]
+    pub fn at(&self, k: usize) -> (f64, f64) {
+        let of = |values: &[f64]| values.get(k).or(values.first()).copied();
+        (of(&self.lower).unwrap_or(f64::NEG_INFINITY), of(&self.upper).unwrap_or(f64::INFINITY))
+    }
+
+    /// The values it was made of.
+    #[must_use]
+    pub fn values(&self) -> (&[f64], &[f64]) {
+        (&self.lower, &self.upper)
+    }
+
+    fn check(&self, argument: &str, count: usize, per: &str) -> Result<(), InvalidInput> {
+        for length in [self.lower.len(), self.upper.len()] {
+            if length != 1 && length != count {
+                let expected = format!("1 or {count} values, one per {per}");
+                return Err(InvalidInput::new(argument, expected, length));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Bounds of an inverse. What is `None` has the default.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bounds {
+    /// Of tendon displacements \[m\].
+    pub displacement: Option<Range>,
+    /// Largest curvature of every segment \[1/m\].
+    pub curvature: Option<Range>,
+    /// Length of every extensible segment \[m\]; default half to twice the rest length.
+    pub length: Option<Range>,
+}
+
+/// No segment turns further \[rad\]: beyond one turn an arc runs through itself.
+const TURN: f64 = std::f64::consts::TAU;
+/// Shortest and longest segment over its rest length, unless bounds say otherwise.
+const STRETCH: (f64, f64) = (0.5, 2.0);
+/// Directions that tendons move by less than this share of the most count as not moved.
+const DEFICIENT: f64 = 1e-10;
+
+/// The region of the unknowns of `Chain`, and where random starts are drawn.
+#[derive(Clone, Debug)]
+pub(super) struct Reach {
+    pub(super) region: Region,
+    /// Largest angle \[rad\], shortest and longest length over the rest length, per segment.
+    pub(super) draws: Vec<(f64, f64, f64)>,
+    /// Freedoms of the arcs that the tendons have.
+    pub(super) freedoms: usize,
+}
+
+impl Reach {
+    pub(super) fn new(plan: &Plan, bounds: &Bounds, tendons: usize) -> Result<Self, InvalidInput> {
+        let (width, count) = (plan.width(), plan.segment_count());
+        let size = width * count;
+        if let Some(range) = &bounds.displacement {
+            range.check("bounds.displacement", tendons, "tendon")?;
+        }
+        for (argument, range) in [
+            ("bounds.curvature", &bounds.curvature),
+            ("bounds.length", &bounds.length),
+        ] {
+            range.as_ref().map_or(Ok(()), |r| r.check(argument, count, "segment"))?;
+        }
+        if width == 2 && bounds.length.is_some() {
+            let expected = "no bounds on length unless settings.extensible";
+            return Err(InvalidInput::new("bounds.length", expected, "bounds"));
+        }
+        if let Some(range) = &bounds.length
+            && (0..count).any(|i| range.at(i).1 <= 0.0)
+        {
+            let expected = "upper bounds above zero [m]";
+            return Err(InvalidInput::new("bounds.length", expected, "one that is not"));
+        }
+        let mut region = Region::new(size);
+        let still = stillness(plan, tendons, &mut region);
+        let mut draws = Vec::with_capacity(count);
+        for (i, segment) in plan.segments().enumerate() {
+            let rest = segment.rest_length;
+            let (shortest, longest) = match &bounds.length {
+                Some(range) => (range.at(i).0.max(1e-3 * rest) / rest, range.at(i).1 / rest),
+                None => STRETCH,
+            };
+            let curvature = bounds.curvature.as_ref().map_or(f64::INFINITY, |range| range.at(i).1);
+            let first = width * i;
+            let mut widest = TURN;
+            if width == 3 {
+                let mut normal = vec![0.0; size];
+                normal[first + 2] = 1.0;
+                region.bound(&normal, longest);
+                normal[first + 2] = -1.0;
+                region.bound(&normal, -shortest);
+                if curvature < f64::INFINITY {
+                    let scale = Some(first + 2);
+                    region.add_disc(Disc { first, radius: curvature * rest, scale });
+                }
+                widest = widest.min(curvature * rest * longest);
+                region.add_disc(Disc { first, radius: TURN, scale: None });
+            } else {
+                widest = widest.min(curvature * rest);
+                region.add_disc(Disc { first, radius: widest, scale: None });
+            }
+            draws.push((widest, shortest, longest.min(2.0 * STRETCH.1 * shortest.max(1.0))));
+        }
+        bound_displacements(plan, bounds, tendons, &mut region);
+        Ok(Self { region, draws, freedoms: size - still })
+    }
+}
+
+/// Unknowns that no tendon moves keep their rest values; returns how many.
+fn stillness(plan: &Plan, tendons: usize, region: &mut Region) -> usize {
+    let size = plan.width() * plan.segment_count();
+    // Square at least, so that the decomposition has all directions.
+    let matrix = DMatrix::from_fn(tendons.max(size), size, |k, j| {
+        if k < tendons { plan.by_unknown(k, j) * scale(plan, j) } else { 0.0 }
+    });
+    let decomposition = matrix.svd(false, true);
+    let largest = decomposition.singular_values.max();
+    let mut still = 0;
+    if let Some(directions) = &decomposition.v_t {
+        for (value, direction) in decomposition.singular_values.iter().zip(directions.row_iter()) {
+            if *value <= DEFICIENT * largest {
+                let normal: Vec<f64> = direction.iter().copied().collect();
+                let at_rest = (0..size).map(|j| normal[j] * rest(plan, j)).sum();
+                region.equate(&normal, at_rest);
+                still += 1;
+            }
+        }
+    }
+    still
+}
+
+/// Value of an unknown at rest.
+pub(super) fn rest(plan: &Plan, unknown: usize) -> f64 {
+    if unknown % plan.width() == 2 { 1.0 } else { 0.0 }
+}
+
+/// From an unknown of `Chain` to one of the plan: lengths are over their rest lengths.
+pub(super) fn scale(plan: &Plan, unknown: usize) -> f64 {
+    let segment = unknown / plan.width();
+    if unknown % plan.width() == 2 { plan.segment(segment).rest_length } else { 1.0 }
+}
+
+fn bound_displacements(plan: &Plan, bounds: &Bounds, tendons: usize, region: &mut Region) {
+    let size = plan.width() * plan.segment_count();
+    for k in 0..tendons {
+        let (lower, mut upper) =
+            bounds.displacement.as_ref().map_or((f64::NEG_INFINITY, f64::INFINITY), |r| r.at(k));
+        // The only tendon of a segment cannot push: released, it does not count.
+        if plan.segments().any(|segment| segment.own == [k]) {
+            upper = upper.min(0.0);
+        }
+        let mut row: Vec<f64> =
+            (0..size).map(|j| plan.by_unknown(k, j) * scale(plan, j)).collect();
+        let at_rest: f64 = (0..size).map(|j| row[j] * rest(plan, j)).sum();
+        region.bound(&row, upper + at_rest);
+        row.iter_mut().for_each(|entry| *entry = -*entry);
+        region.bound(&row, -lower - at_rest);
+    }
+}

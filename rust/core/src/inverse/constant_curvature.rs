@@ -1,0 +1,272 @@
+//! The inverse of the constant-curvature model.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Vector2, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::bounds::{Bounds, Reach, rest, scale};
+use super::chain::Chain;
+use super::search::{Effort, Found, Search};
+use super::{InverseSettings, Target};
+use crate::constant_curvature::{Arc, Plan, displacements};
+use crate::error::InvalidInput;
+use crate::robot::Robot;
+use crate::solve::fit::Problem;
+use crate::status::Status;
+
+/// How an inverse ended; the arcs are in the workspace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// Converged: the target is met, with the least bending energy nearby where there is freedom.
+    /// Unreachable: the nearest pose that the starts led to. Infeasible: the bounds exclude each other.
+    pub status: Status,
+    /// Distance from the tool to the target over the axes that count \[m\].
+    pub distance: f64,
+    /// Angle from the tool to the target over the axes that count \[rad\]; 0 for a position.
+    pub angle: f64,
+    /// Steps taken from all starts.
+    pub iterations: usize,
+    /// Starts tried.
+    pub starts: usize,
+}
+
+/// Buffers of a solve and the arcs it found.
+#[derive(Clone, Debug)]
+pub struct Workspace<'a> {
+    chain: Chain<'a>,
+    search: Search,
+}
+
+/// A robot prepared for inverse solves with the constant-curvature model.
+#[derive(Clone, Debug)]
+pub struct ConstantCurvatureInverse<'a> {
+    robot: &'a Robot,
+    plan: &'a Plan,
+    settings: InverseSettings,
+    reach: Reach,
+}
+
+impl<'a> ConstantCurvatureInverse<'a> {
+    /// Prepares a robot; the plan must be of this robot.
+    ///
+    /// # Errors
+    /// `InvalidInput` for settings out of range and bounds that do not fit the robot.
+    pub fn new(
+        robot: &'a Robot,
+        plan: &'a Plan,
+        bounds: &Bounds,
+        settings: InverseSettings,
+    ) -> Result<Self, InvalidInput> {
+        settings.validate()?;
+        let reach = Reach::new(plan, bounds, robot.tendons().len())?;
+        Ok(Self { robot, plan, settings, reach })
+    }
+
+    /// The robot it was prepared from.
+    #[must_use]
+    pub fn robot(&self) -> &Robot {
+        self.robot
+    }
+
+    /// Buffers for this inverse.
+    #[must_use]
+    pub fn workspace(&'a self) -> Workspace<'a> {
+        Workspace {
+            chain: Chain::new(self.robot, self.plan, &self.settings),
+            search: Search::default(),
+        }
+    }
+
+    /// Seeks arcs that bring the tool to `target`; first from `start`, if given.
+    pub fn solve(&self, target: &Target, start: Option<&[Arc]>, work: &mut Workspace<'a>) -> Answer {
+        work.chain.aim(*target);
+        let effort = self.effort(&work.chain, self.settings.starts);
+        let given = usize::from(start.is_some());
+        let found = work.search.run(&mut work.chain, &self.reach.region, effort, |k, point| {
+            match start {
+                Some(arcs) if k == 0 => self.unknowns(arcs, point),
+                _ => self.start(target, k - given, point),
+            }
+        });
+        Self::answer(found, &work.chain)
+    }
+
+    /// Seeks again from where the last solve in `work` ended, as along a path; from other starts only when
+    /// that fails.
+    pub fn follow(&self, target: &Target, work: &mut Workspace<'a>) -> Answer {
+        work.chain.aim(*target);
+        let effort = self.effort(&work.chain, self.settings.starts);
+        let found = work.search.run(&mut work.chain, &self.reach.region, effort, |k, point| {
+            if k > 0 {
+                self.start(target, k - 1, point);
+            }
+        });
+        Self::answer(found, &work.chain)
+    }
+
+    /// Every distinct answer that the starts lead to, least bending energy first: its arcs, its energy over
+    /// that of the others, and how many starts led there.
+    #[must_use]
+    pub fn solutions(&self, target: &Target) -> Vec<Solution> {
+        let mut work = self.workspace();
+        work.chain.aim(*target);
+        let effort = Effort { starts: 1, ..self.effort(&work.chain, 1) };
+        let mut distinct: Vec<(Vec<f64>, Solution)> = Vec::new();
+        let mut slope = vec![0.0; self.reach.region.size()];
+        for k in 0..self.settings.starts {
+            let found = work.search.run(&mut work.chain, &self.reach.region, effort, |_, point| {
+                self.start(target, k, point);
+            });
+            if found.status != Status::Converged {
+                continue;
+            }
+            let point = &work.search.point;
+            let same = |other: &[f64]| {
+                other.iter().zip(point).all(|(a, b)| (a - b).abs() <= DISTINCT)
+            };
+            if let Some((_, known)) = distinct.iter_mut().find(|(other, _)| same(other)) {
+                known.hits += 1;
+                continue;
+            }
+            let energy = work.chain.energy(point, &mut slope);
+            let answer = Self::answer(found, &work.chain);
+            let solution = Solution { arcs: self.arcs(&work), energy, hits: 1, answer };
+            distinct.push((point.clone(), solution));
+        }
+        distinct.sort_by(|(_, a), (_, b)| a.energy.total_cmp(&b.energy));
+        distinct.into_iter().map(|(_, solution)| solution).collect()
+    }
+
+    fn effort(&self, chain: &Chain<'_>, starts: usize) -> Effort {
+        Effort {
+            starts,
+            max_iterations: self.settings.max_iterations,
+            redundant: self.reach.freedoms > chain.rows(),
+        }
+    }
+
+    fn answer(found: Found, chain: &Chain<'_>) -> Answer {
+        let (distance, angle) = chain.misses();
+        let Found { status, iterations, starts } = found;
+        Answer { status, distance, angle, iterations, starts }
+    }
+
+    /// The arcs that the last solve in `work` found, base first.
+    #[must_use]
+    pub fn arcs(&self, work: &Workspace<'_>) -> Vec<Arc> {
+        let width = self.plan.width();
+        let segments = self.plan.segments().zip(work.search.point.chunks_exact(width));
+        let arcs = segments.map(|(segment, q)| Arc {
+            bend: Vector2::new(q[0], q[1]),
+            length: segment.rest_length * if width == 3 { q[2] } else { 1.0 },
+        });
+        arcs.collect()
+    }
+
+    /// The displacements that give the robot the arcs that the last solve in `work` found \[m\].
+    pub fn write_displacements(&self, work: &Workspace<'_>, place: &mut [f64]) {
+        for (k, displacement) in place.iter_mut().enumerate() {
+            let unknowns = work.search.point.iter().enumerate();
+            *displacement = unknowns.fold(0.0, |sum, (j, value)| {
+                let moved = (value - rest(self.plan, j)) * scale(self.plan, j);
+                sum + self.plan.by_unknown(k, j) * moved
+            });
+        }
+    }
+
+    fn unknowns(&self, arcs: &[Arc], point: &mut Vec<f64>) {
+        point.clear();
+        for (arc, segment) in arcs.iter().zip(self.plan.segments()) {
+            point.extend_from_slice(arc.bend.as_slice());
+            if self.plan.width() == 3 {
+                point.push(arc.length / segment.rest_length);
+            }
+        }
+    }
+
+    /// The k-th start: one arc to the target, which is the answer for a single segment; nearly straight;
+    /// then random ones, each from its own stream.
+    fn start(&self, target: &Target, k: usize, point: &mut Vec<f64>) {
+        point.clear();
+        match k {
+            0 => self.single_arc(target, point),
+            1 => self.nearly_straight(point),
+            _ => self.random(k, point),
+        }
+    }
+
+    /// All segments on the circle that leaves the base along z and passes the target.
+    fn single_arc(&self, target: &Target, point: &mut Vec<f64>) {
+        let mut tip = target.position();
+        let tool = self.robot.tool();
+        if let Target::Pose(pose) = target {
+            tip = pose.compose(&tool.inverse()).translation;
+        }
+        let local: Vector3<f64> = self.robot.base().inverse().transform(&tip);
+        let across = local.x.hypot(local.y);
+        let half = across.atan2(local.z);
+        let angle = 2.0 * half;
+        let length = if half > 0.0 { local.norm() * half / half.sin() } else { local.norm() };
+        let direction =
+            if across > 0.0 { Vector2::new(local.x, local.y) / across } else { Vector2::x() };
+        let rest: f64 = self.plan.segments().map(|segment| segment.rest_length).sum();
+        for (segment, (widest, shortest, longest)) in self.plan.segments().zip(&self.reach.draws) {
+            let bend = direction * (angle * segment.rest_length / rest).min(*widest);
+            point.extend_from_slice(bend.as_slice());
+            if self.plan.width() == 3 {
+                point.push((length / rest).clamp(*shortest, *longest));
+            }
+        }
+    }
+
+    fn nearly_straight(&self, point: &mut Vec<f64>) {
+        for (i, (_, shortest, longest)) in self.reach.draws.iter().enumerate() {
+            let (sin, cos) = (2.4 * i as f64).sin_cos();
+            point.extend([0.02 * cos, 0.02 * sin]);
+            if self.plan.width() == 3 {
+                point.push(1.0_f64.clamp(*shortest, *longest));
+            }
+        }
+    }
+
+    fn random(&self, k: usize, point: &mut Vec<f64>) {
+        let mut draws = ChaCha8Rng::seed_from_u64(self.settings.seed);
+        draws.set_stream(k as u64);
+        for (widest, shortest, longest) in &self.reach.draws {
+            // Segments seldom turn by more than half a turn: every other start looks no further.
+            let widest = if k % 2 == 0 { widest.min(PI) } else { *widest };
+            let angle = widest * draws.random::<f64>();
+            let (sin, cos) = (TAU * draws.random::<f64>()).sin_cos();
+            point.extend([angle * cos, angle * sin]);
+            if self.plan.width() == 3 {
+                point.push(shortest + (longest - shortest) * draws.random::<f64>());
+            }
+        }
+    }
+}
+
+/// Unknowns that differ by more than this are other answers.
+const DISTINCT: f64 = 1e-6;
+
+/// One of several answers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// Its arcs, base first.
+    pub arcs: Vec<Arc>,
+    /// Its bending energy, in a unit common to the answers.
+    pub energy: f64,
+    /// How many starts led to it.
+    pub hits: usize,
+    /// How it ended.
+    pub answer: Answer,
+}
+
+impl Solution {
+    /// Its displacements \[m\].
+    #[must_use]
+    pub fn displacements(&self, plan: &Plan) -> Vec<f64> {
+        displacements(plan, &self.arcs).iter().copied().collect()
+    }
+}

@@ -1,0 +1,127 @@
+//! Descents from many starts until one meets the target.
+
+use crate::solve::fit::{Ending, Problem, Purpose, Workspace};
+use crate::solve::region::Region;
+use crate::status::Status;
+
+/// Ends of descents that are kept as candidates for the nearest point.
+const CANDIDATES: usize = 4;
+/// Steps that find the nearest point from a candidate.
+const POLISH: usize = 300;
+/// Steps that lower the energy.
+const LOWER: usize = 500;
+
+/// Buffers of a search, and the point it found.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Search {
+    pub(super) fit: Workspace<6>,
+    /// The unknowns found.
+    pub(super) point: Vec<f64>,
+    /// Where descents ended that did not meet the target, by their squared residual, best first.
+    candidates: Vec<(f64, Vec<f64>)>,
+}
+
+/// How a search ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Found {
+    pub(super) status: Status,
+    pub(super) iterations: usize,
+    pub(super) starts: usize,
+}
+
+/// What to search for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    pub(super) starts: usize,
+    pub(super) max_iterations: usize,
+    /// There is freedom left for the energy.
+    pub(super) redundant: bool,
+}
+
+impl Search {
+    /// Tries `start(k, point)` for k = 0, 1, ... until a descent meets the target; else finds the point
+    /// nearest to it. `point` holds the answer whatever the status.
+    pub(super) fn run<P: Problem<6>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        effort: Effort,
+        mut start: impl FnMut(usize, &mut Vec<f64>),
+    ) -> Found {
+        self.fit.iterations = 0;
+        self.candidates.clear();
+        for k in 0..effort.starts {
+            start(k, &mut self.point);
+            if !self.fit.restore(region, &mut self.point) {
+                if k == 0 {
+                    return self.found(Status::Infeasible, 1);
+                }
+                continue;
+            }
+            let limit = effort.max_iterations;
+            match self.fit.descend(problem, region, &mut self.point, Purpose::Meet, limit) {
+                Ending::Met => {
+                    let status = self.spend_freedom(problem, region, effort);
+                    return self.found(status, k + 1);
+                }
+                Ending::Failed => {}
+                Ending::Stalled | Ending::IterationLimit => self.remember(),
+            }
+        }
+        let status = self.nearest(problem, region, effort);
+        self.found(status, effort.starts)
+    }
+
+    fn found(&self, status: Status, starts: usize) -> Found {
+        Found { status, iterations: self.fit.iterations, starts }
+    }
+
+    /// Lowers the energy where the target leaves freedom.
+    fn spend_freedom<P: Problem<6>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        effort: Effort,
+    ) -> Status {
+        if !effort.redundant {
+            return Status::Converged;
+        }
+        match self.fit.lower_energy(problem, region, &mut self.point, LOWER) {
+            Ending::Met => Status::Converged,
+            _ => Status::IterationLimit,
+        }
+    }
+
+    /// Keeps the point if it is among the best.
+    fn remember(&mut self) {
+        let squared = self.fit.residual.norm_squared();
+        let place = self.candidates.partition_point(|(other, _)| *other <= squared);
+        if squared.is_finite() && place < CANDIDATES {
+            self.candidates.truncate(CANDIDATES - 1);
+            self.candidates.insert(place.min(self.candidates.len()), (squared, self.point.clone()));
+        }
+    }
+
+    /// Descends to a minimum from the best candidates and keeps the best.
+    fn nearest<P: Problem<6>>(&mut self, problem: &mut P, region: &Region, effort: Effort) -> Status {
+        let mut best: Option<(f64, Status, Vec<f64>)> = None;
+        for (_, mut point) in std::mem::take(&mut self.candidates) {
+            let ending = self.fit.descend(problem, region, &mut point, Purpose::Nearest, POLISH);
+            let squared = self.fit.residual.norm_squared();
+            if ending == Ending::Met {
+                self.point = point;
+                return self.spend_freedom(problem, region, effort);
+            }
+            let status = match ending {
+                Ending::Stalled => Status::Unreachable,
+                _ => Status::IterationLimit,
+            };
+            if best.as_ref().is_none_or(|(least, _, _)| squared < *least) {
+                best = Some((squared, status, point));
+            }
+        }
+        let Some((_, status, point)) = best else { return Status::NumericalError };
+        self.point = point;
+        status
+    }
+}

@@ -1,0 +1,296 @@
+//! Nonlinear least squares over a convex region, by Levenberg-Marquardt and Newton steps.
+//!
+//! `min |r(z)|^2 / 2` for `z` in a [`Region`]. A step is the minimum of the damped quadratic model under
+//! the region's linearised constraints, brought back into the region where discs are round; every point
+//! is inside. Damping in proportion to the squared residual keeps the quadratic convergence of
+//! Gauss-Newton at points that meet the target (N. Yamashita, M. Fukushima, Computing Suppl. 15 (2001),
+//! doi:10.1007/978-3-7091-6217-0_18). The nearest point to a target out of reach is polished with
+//! second derivatives, without which steps would shrink only linearly there.
+
+use nalgebra::SVector;
+
+use super::least::Least;
+use super::quadratic::{Outcome, Quadratic, Rows, dot};
+use super::region::{Region, Restoring};
+
+/// Residuals of `R` rows, and an energy that chooses among the points where they vanish.
+pub trait Problem<const R: usize> {
+    /// Residuals, and their derivatives by every unknown.
+    fn evaluate(&mut self, z: &[f64], residual: &mut SVector<f64, R>, jacobian: &mut [SVector<f64, R>]);
+
+    /// Whether residuals are as small as wanted.
+    fn met(&self, residual: &SVector<f64, R>) -> bool;
+
+    /// Adds the second derivatives of `weights . r` to the lower triangle of a matrix, row by row, at the
+    /// point evaluated last.
+    fn add_hessian(&self, weights: &SVector<f64, R>, hessian: &mut [f64]);
+
+    /// The energy, of order 1, and its gradient.
+    fn energy(&self, z: &[f64], gradient: &mut [f64]) -> f64;
+
+    /// Adds the energy's second derivatives to the lower triangle of a matrix.
+    fn add_energy_hessian(&self, z: &[f64], hessian: &mut [f64]);
+}
+
+/// Why an iteration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The residuals are as small as wanted.
+    Met,
+    /// At, or on the way to, a minimum that does not meet them.
+    Stalled,
+    /// Out of iterations.
+    IterationLimit,
+    /// A number was not finite, or a program had no solution.
+    Failed,
+}
+
+/// What a descent is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// To meet the residuals, or to give up early so that another start gets its turn.
+    Meet,
+    /// To find a minimum to full precision, whether it meets them or not.
+    Nearest,
+}
+
+/// No step moves an unknown further.
+const STEP: f64 = 1.0;
+/// Share of the squared residual that damps the first step.
+const DAMPING: f64 = 0.1;
+/// Damping at least, as a share of the trace: rounding in a singular matrix is below it.
+const FLOOR: f64 = 1e-13;
+/// Damping beyond which no step is left.
+const STUCK: f64 = 1e12;
+/// A step that lowers the squared residual by less than this share makes no headway...
+const HEADWAY: f64 = 1e-3;
+/// ...and this many of them are a stall.
+const PATIENCE: usize = 5;
+/// Weight of rows along which no step is wanted, over the size of the Hessian.
+const STIFF: f64 = 10.0;
+/// A row adds nothing to others when this share of its square is outside them.
+const DEPENDENT: f64 = 1e-12;
+/// A minimum is found when the gradient of the Lagrangian is this share of what it can be.
+const STATIONARY: f64 = 1e-11;
+
+/// Buffers, reused from one descent to the next.
+#[derive(Clone, Debug)]
+pub struct Workspace<const R: usize> {
+    /// Steps taken so far, for the caller to reset.
+    pub iterations: usize,
+    /// Residuals at the last point.
+    pub residual: SVector<f64, R>,
+    pub(super) jacobian: Vec<SVector<f64, R>>,
+    pub(super) program: Quadratic,
+    pub(super) rows: Rows,
+    pub(super) hessian: Vec<f64>,
+    pub(super) trial: Vec<f64>,
+    trial_residual: SVector<f64, R>,
+    trial_jacobian: Vec<SVector<f64, R>>,
+    /// Of the programs that bring points back: the active rows of the last model are still needed.
+    pub(super) inside: Restoring,
+    pub(super) least: Least,
+    /// Rows along which no step is wanted, orthonormal.
+    basis: Vec<f64>,
+}
+
+impl<const R: usize> Default for Workspace<R> {
+    fn default() -> Self {
+        Self {
+            iterations: 0,
+            residual: SVector::zeros(),
+            jacobian: Vec::new(),
+            program: Quadratic::default(),
+            rows: Rows::default(),
+            hessian: Vec::new(),
+            trial: Vec::new(),
+            trial_residual: SVector::zeros(),
+            trial_jacobian: Vec::new(),
+            inside: Restoring::default(),
+            least: Least::default(),
+            basis: Vec::new(),
+        }
+    }
+}
+
+impl<const R: usize> Workspace<R> {
+    /// Brings a point into the region; false when the region is empty as far as this can tell.
+    pub fn restore(&mut self, region: &Region, z: &mut [f64]) -> bool {
+        region.restore(z, &mut self.inside)
+    }
+
+    /// Descends from `z`, a point of the region.
+    pub fn descend<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        z: &mut Vec<f64>,
+        purpose: Purpose,
+        max_iterations: usize,
+    ) -> Ending {
+        let size = region.size();
+        self.jacobian.resize(size, SVector::zeros());
+        self.trial_jacobian.resize(size, SVector::zeros());
+        problem.evaluate(z, &mut self.residual, &mut self.jacobian);
+        let mut squared = self.residual.norm_squared();
+        let (mut damping, mut idle) = (DAMPING, 0);
+        self.program.active.clear();
+        for _ in 0..max_iterations {
+            if problem.met(&self.residual) {
+                return Ending::Met;
+            }
+            if !squared.is_finite() {
+                return Ending::Failed;
+            }
+            self.iterations += 1;
+            if !self.model(problem, region, z, purpose, &mut damping) {
+                return Ending::Failed;
+            }
+            if purpose == Purpose::Nearest && self.stationary(squared) {
+                return Ending::Stalled;
+            }
+            let lower = self.accept(problem, region, z, squared);
+            if let Some(lower) = lower {
+                idle = if lower > (1.0 - HEADWAY) * squared { idle + 1 } else { 0 };
+                squared = lower;
+                damping *= 0.2;
+            } else {
+                damping = (8.0 * damping).max(1e-9);
+            }
+            let stuck = damping > STUCK || (purpose == Purpose::Meet && idle > PATIENCE);
+            if stuck {
+                return Ending::Stalled;
+            }
+        }
+        if problem.met(&self.residual) { Ending::Met } else { Ending::IterationLimit }
+    }
+
+    /// Minimises the damped model under the linearised constraints; raises the damping until the model is
+    /// convex.
+    fn model<P: Problem<R>>(
+        &mut self,
+        problem: &P,
+        region: &Region,
+        z: &[f64],
+        purpose: Purpose,
+        damping: &mut f64,
+    ) -> bool {
+        let size = region.size();
+        self.gauss_newton(size);
+        let trace: f64 = (0..size).map(|i| self.hessian[i * (size + 1)]).sum();
+        if purpose == Purpose::Nearest {
+            problem.add_hessian(&self.residual, &mut self.hessian);
+            region.add_curvature(z, &self.program, 0, &mut self.hessian);
+            self.rows.clear();
+            region.linearize(z, &mut self.rows);
+            self.stiffen(size, 0);
+        }
+        let squared = self.residual.norm_squared();
+        let mut added = 0.0;
+        loop {
+            let shift = *damping * squared + FLOOR * trace;
+            for i in 0..size {
+                self.hessian[i * (size + 1)] += shift - added;
+            }
+            added = shift;
+            if self.program.factor(&self.hessian, size) {
+                break;
+            }
+            *damping = (8.0 * *damping).max(1e-9);
+            if *damping > STUCK {
+                return false;
+            }
+        }
+        self.program.solve_free();
+        self.trial.clear();
+        self.trial.extend(z.iter().zip(&self.program.step).map(|(z, p)| z + p));
+        // A point inside satisfies every tangent too.
+        if region.contains(&self.trial) {
+            return true;
+        }
+        self.rows.clear();
+        region.linearize(z, &mut self.rows);
+        self.program.solve(&self.rows) == Outcome::Solved
+    }
+
+    /// The lower triangle of `J^T J`, and the gradient.
+    fn gauss_newton(&mut self, size: usize) {
+        self.hessian.clear();
+        self.hessian.resize(size * size, 0.0);
+        self.program.gradient.clear();
+        for i in 0..size {
+            for j in 0..=i {
+                self.hessian[i * size + j] = self.jacobian[i].dot(&self.jacobian[j]);
+            }
+            self.program.gradient.push(self.jacobian[i].dot(&self.residual));
+        }
+    }
+
+    /// Adds the square of the projection onto the first `fixed` rows and those that were active last: no
+    /// step along them is wanted, so that only curvature across them has to be positive.
+    pub(super) fn stiffen(&mut self, size: usize, fixed: usize) {
+        self.basis.clear();
+        let active = self.program.active.iter().copied().filter(|row| *row >= fixed);
+        for row in (0..fixed).chain(active) {
+            let start = self.basis.len();
+            self.basis.extend_from_slice(self.rows.normal(size, row));
+            let (others, mine) = self.basis.split_at_mut(start);
+            let whole = dot(mine, mine);
+            for other in others.chunks_exact(size) {
+                let along = dot(other, mine);
+                mine.iter_mut().zip(other).for_each(|(m, o)| *m -= along * o);
+            }
+            let left = dot(mine, mine);
+            if left > DEPENDENT * whole {
+                let norm = left.sqrt();
+                mine.iter_mut().for_each(|m| *m /= norm);
+            } else {
+                self.basis.truncate(start);
+            }
+        }
+        if self.basis.is_empty() {
+            return;
+        }
+        let weight = STIFF * dot(&self.hessian, &self.hessian).sqrt();
+        for normal in self.basis.chunks_exact(size) {
+            for i in 0..size {
+                for j in 0..=i {
+                    self.hessian[i * size + j] += weight * normal[i] * normal[j];
+                }
+            }
+        }
+    }
+
+    /// Whether the gradient of the Lagrangian vanishes.
+    fn stationary(&self, squared: f64) -> bool {
+        let steepest = self.jacobian.iter().fold(0.0_f64, |most, column| most.max(column.norm()));
+        let left = self.program.lagrangian_gradient(&self.rows);
+        left <= STATIONARY * steepest * squared.sqrt()
+    }
+
+    /// Takes the model's step if it lowers the squared residual, which is returned.
+    fn accept<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        z: &mut Vec<f64>,
+        squared: f64,
+    ) -> Option<f64> {
+        let longest = self.program.step.iter().fold(0.0_f64, |most, p| most.max(p.abs()));
+        let share = if longest > STEP { STEP / longest } else { 1.0 };
+        self.trial.clear();
+        self.trial.extend(z.iter().zip(&self.program.step).map(|(z, p)| z + share * p));
+        if !region.contains(&self.trial) && !region.restore(&mut self.trial, &mut self.inside) {
+            return None;
+        }
+        problem.evaluate(&self.trial, &mut self.trial_residual, &mut self.trial_jacobian);
+        let lower = self.trial_residual.norm_squared();
+        if lower < squared {
+            std::mem::swap(z, &mut self.trial);
+            std::mem::swap(&mut self.residual, &mut self.trial_residual);
+            std::mem::swap(&mut self.jacobian, &mut self.trial_jacobian);
+            return Some(lower);
+        }
+        None
+    }
+}
