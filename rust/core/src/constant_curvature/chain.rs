@@ -55,6 +55,16 @@ pub(crate) struct Segment {
     pub(crate) own: Vec<usize>,
 }
 
+impl Segment {
+    /// Bending energy over half the squared angle \[J, or 1/m in units of EI\].
+    pub(crate) fn stiffness(&self, robot: &Robot) -> f64 {
+        let backbone = robot.backbone();
+        let pieces = (self.first..).zip(&backbone.lengths()[self.first..self.last]);
+        let sum: f64 = pieces.map(|(j, length)| backbone.bending_stiffness(j) * length).sum();
+        sum / self.rest_length.powi(2)
+    }
+}
+
 /// What the model knows of a robot before any displacement.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -140,15 +150,6 @@ impl Plan {
     pub(crate) fn by_unknown(&self, tendon: usize, unknown: usize) -> f64 {
         let entry = self.matrix[(tendon, unknown)];
         if unknown % self.width() < 2 { entry * self.scale } else { entry }
-    }
-
-    /// Bending energy of a segment over half its squared angle.
-    pub(crate) fn stiffness(&self, robot: &Robot, segment: &Segment) -> f64 {
-        let backbone = robot.backbone();
-        let lengths = &backbone.lengths()[segment.first..segment.last];
-        let pieces = (segment.first..).zip(lengths);
-        let sum: f64 = pieces.map(|(j, length)| backbone.bending_stiffness(j) * length).sum();
-        sum / segment.rest_length.powi(2)
     }
 
     /// Tendons that count: not free, and not the only, released one of its segment.

@@ -98,10 +98,9 @@ impl Reach {
         if let Some(range) = &bounds.displacement {
             range.check("bounds.displacement", tendons, "tendon")?;
         }
-        for (argument, range) in [
-            ("bounds.curvature", &bounds.curvature),
-            ("bounds.length", &bounds.length),
-        ] {
+        for (argument, range) in
+            [("bounds.curvature", &bounds.curvature), ("bounds.length", &bounds.length)]
+        {
             range.as_ref().map_or(Ok(()), |r| r.check(argument, count, "segment"))?;
         }
         if width == 2 && bounds.length.is_some() {
@@ -142,6 +141,7 @@ impl Reach {
                 widest = widest.min(curvature * rest);
                 region.add_disc(Disc { first, radius: widest, scale: None });
             }
+            // Without an upper bound, starts are drawn up to twice the default one.
             draws.push((widest, shortest, longest.min(2.0 * STRETCH.1 * shortest.max(1.0))));
         }
         bound_displacements(plan, bounds, tendons, &mut region);
@@ -192,11 +192,12 @@ fn bound_displacements(plan: &Plan, bounds: &Bounds, tendons: usize, region: &mu
         if plan.segments().any(|segment| segment.own == [k]) {
             upper = upper.min(0.0);
         }
-        let mut row: Vec<f64> =
-            (0..size).map(|j| plan.by_unknown(k, j) * scale(plan, j)).collect();
+        let mut row: Vec<f64> = (0..size).map(|j| plan.by_unknown(k, j) * scale(plan, j)).collect();
         let at_rest: f64 = (0..size).map(|j| row[j] * rest(plan, j)).sum();
         region.bound(&row, upper + at_rest);
-        row.iter_mut().for_each(|entry| *entry = -*entry);
+        for entry in &mut row {
+            *entry = -*entry;
+        }
         region.bound(&row, -lower - at_rest);
     }
 }

@@ -47,7 +47,7 @@ impl<'a> Chain<'a> {
         let radian = settings.rotation_weight.map(|w| w.unwrap_or(RADIAN * length) / length);
         let [x, y, z] = settings.position_weight.map(|w| w / length);
         let count = plan.segments().len();
-        let stiffness: Vec<f64> = plan.segments().map(|s| plan.stiffness(robot, s)).collect();
+        let stiffness: Vec<f64> = plan.segments().map(|s| s.stiffness(robot)).collect();
         let mean = stiffness.iter().sum::<f64>() / count as f64;
         Self {
             robot,

@@ -80,16 +80,20 @@ impl<'a> ConstantCurvatureInverse<'a> {
     }
 
     /// Seeks arcs that bring the tool to `target`; first from `start`, if given.
-    pub fn solve(&self, target: &Target, start: Option<&[Arc]>, work: &mut Workspace<'a>) -> Answer {
+    pub fn solve(
+        &self,
+        target: &Target,
+        start: Option<&[Arc]>,
+        work: &mut Workspace<'a>,
+    ) -> Answer {
         work.chain.aim(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
         let given = usize::from(start.is_some());
-        let found = work.search.run(&mut work.chain, &self.reach.region, effort, |k, point| {
-            match start {
+        let found =
+            work.search.run(&mut work.chain, &self.reach.region, effort, |k, point| match start {
                 Some(arcs) if k == 0 => self.unknowns(arcs, point),
                 _ => self.start(target, k - given, point),
-            }
-        });
+            });
         Self::answer(found, &work.chain)
     }
 
@@ -123,9 +127,8 @@ impl<'a> ConstantCurvatureInverse<'a> {
                 continue;
             }
             let point = &work.search.point;
-            let same = |other: &[f64]| {
-                other.iter().zip(point).all(|(a, b)| (a - b).abs() <= DISTINCT)
-            };
+            let same =
+                |other: &[f64]| other.iter().zip(point).all(|(a, b)| (a - b).abs() <= DISTINCT);
             if let Some((_, known)) = distinct.iter_mut().find(|(other, _)| same(other)) {
                 known.hits += 1;
                 continue;
@@ -236,7 +239,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         draws.set_stream(k as u64);
         for (widest, shortest, longest) in &self.reach.draws {
             // Segments seldom turn by more than half a turn: every other start looks no further.
-            let widest = if k % 2 == 0 { widest.min(PI) } else { *widest };
+            let widest = if k.is_multiple_of(2) { widest.min(PI) } else { *widest };
             let angle = widest * draws.random::<f64>();
             let (sin, cos) = (TAU * draws.random::<f64>()).sin_cos();
             point.extend([angle * cos, angle * sin]);

@@ -13,8 +13,8 @@ mod settings;
 use nalgebra::{Matrix3, Vector3};
 
 pub use bounds::{Bounds, Range};
-pub use rows::{InverseRows, invert_path, invert_rows};
 pub use constant_curvature::{Answer, ConstantCurvatureInverse, Solution, Workspace};
+pub use rows::{InverseRows, invert_path, invert_rows};
 pub use settings::InverseSettings;
 
 use crate::error::InvalidInput;

@@ -103,7 +103,12 @@ impl Search {
     }
 
     /// Descends to a minimum from the best candidates and keeps the best.
-    fn nearest<P: Problem<6>>(&mut self, problem: &mut P, region: &Region, effort: Effort) -> Status {
+    fn nearest<P: Problem<6>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        effort: Effort,
+    ) -> Status {
         let mut best: Option<(f64, Status, Vec<f64>)> = None;
         for (_, mut point) in std::mem::take(&mut self.candidates) {
             let ending = self.fit.descend(problem, region, &mut point, Purpose::Nearest, POLISH);

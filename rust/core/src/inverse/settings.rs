@@ -61,7 +61,8 @@ impl InverseSettings {
             let expected = "a positive weight for something";
             return Err(InvalidInput::new("position_weight", expected, "zeros everywhere"));
         }
-        for (argument, value) in [("starts", self.starts), ("max_iterations", self.max_iterations)] {
+        for (argument, value) in [("starts", self.starts), ("max_iterations", self.max_iterations)]
+        {
             if value == 0 {
                 return Err(InvalidInput::new(argument, "1 or more", value));
             }

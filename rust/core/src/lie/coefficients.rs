@@ -94,8 +94,7 @@ impl Angle {
 
     /// `(b′ / t)′ / t = (c − b − 4 b′/t) / t²`.
     pub(crate) fn b_bend(&self) -> f64 {
-        self.sum(&B_BEND)
-            .unwrap_or_else(|| (self.c() - self.b() - 4.0 * self.b_slope()) / self.x)
+        self.sum(&B_BEND).unwrap_or_else(|| (self.c() - self.b() - 4.0 * self.b_slope()) / self.x)
     }
 
     /// `c′(t) / t = (b − 3c) / t²`.

@@ -16,7 +16,12 @@ use super::region::{Region, Restoring};
 /// Residuals of `R` rows, and an energy that chooses among the points where they vanish.
 pub trait Problem<const R: usize> {
     /// Residuals, and their derivatives by every unknown.
-    fn evaluate(&mut self, z: &[f64], residual: &mut SVector<f64, R>, jacobian: &mut [SVector<f64, R>]);
+    fn evaluate(
+        &mut self,
+        z: &[f64],
+        residual: &mut SVector<f64, R>,
+        jacobian: &mut [SVector<f64, R>],
+    );
 
     /// Whether residuals are as small as wanted.
     fn met(&self, residual: &SVector<f64, R>) -> bool;
@@ -243,7 +248,9 @@ impl<const R: usize> Workspace<R> {
             let left = dot(mine, mine);
             if left > DEPENDENT * whole {
                 let norm = left.sqrt();
-                mine.iter_mut().for_each(|m| *m /= norm);
+                for entry in mine {
+                    *entry /= norm;
+                }
             } else {
                 self.basis.truncate(start);
             }

@@ -69,9 +69,9 @@ impl<const R: usize> Workspace<R> {
         let mut pull = SVector::<f64, R>::zeros();
         let mut damping = 0.0;
         self.program.active.clear();
+        problem.evaluate(z, &mut self.residual, &mut self.jacobian);
         for _ in 0..max_iterations {
             self.iterations += 1;
-            problem.evaluate(z, &mut self.residual, &mut self.jacobian);
             if !self.energy_model(problem, region, z, &least.gradient, &pull, &mut damping) {
                 return Ending::Failed;
             }
@@ -82,24 +82,26 @@ impl<const R: usize> Workspace<R> {
                 }
             }
             // Strong multipliers carry the rounding of what they multiply.
-            let strongest = self.program.multipliers.iter().fold(1.0_f64, |most, m| most.max(m.abs()));
+            let strongest =
+                self.program.multipliers.iter().fold(1.0_f64, |most, m| most.max(m.abs()));
             if self.program.lagrangian_gradient(&self.rows) <= STATIONARY * strongest {
                 return Ending::Met;
             }
             if self.step_down(problem, region, z, &pull, ROUNDING * strongest, least) {
                 damping = if damping < DAMPING.0 { 0.0 } else { 0.6 * damping };
             } else {
+                problem.evaluate(z, &mut self.residual, &mut self.jacobian);
                 damping = (8.0 * damping).max(DAMPING.0);
                 if damping > DAMPING.1 {
                     break;
                 }
             }
         }
-        problem.evaluate(z, &mut self.residual, &mut self.jacobian);
         Ending::IterationLimit
     }
 
-    /// Takes a share of the model's step that lowers the energy, if there is one.
+    /// Takes a share of the model's step that lowers the energy, if there is one; the new point has then
+    /// been evaluated.
     fn step_down<P: Problem<R>>(
         &mut self,
         problem: &mut P,

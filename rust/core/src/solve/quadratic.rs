@@ -61,7 +61,7 @@ const DEPENDENT: f64 = 1e-11;
 #[derive(Clone, Debug, Default)]
 pub struct Quadratic {
     size: usize,
-    /// Cholesky factor of the Hessian, lower, row by row.
+    /// Cholesky factor of the Hessian, lower, row by row, its diagonal inverted.
     factor: Vec<f64>,
     /// The linear term, set before a solve.
     pub gradient: Vec<f64>,
@@ -93,7 +93,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y)
 }
 
-/// Cholesky factor in place of the lower triangle, row by row; false unless positive definite.
+/// Cholesky factor in place of the lower triangle, row by row, its diagonal inverted; false unless
+/// positive definite.
 fn cholesky(matrix: &mut [f64], size: usize) -> bool {
     for i in 0..size {
         for j in 0..=i {
@@ -104,9 +105,9 @@ fn cholesky(matrix: &mut [f64], size: usize) -> bool {
                 below[j] - dot(&below[..j], &above[j * size..j * size + j])
             };
             if j < i {
-                below[j] = sum / above[j * size + j];
+                below[j] = sum * above[j * size + j];
             } else if sum > 0.0 {
-                below[j] = sum.sqrt();
+                below[j] = 1.0 / sum.sqrt();
             } else {
                 return false;
             }
@@ -119,14 +120,14 @@ fn cholesky(matrix: &mut [f64], size: usize) -> bool {
 fn forward(factor: &[f64], size: usize, x: &mut [f64]) {
     for i in 0..size {
         let row = &factor[i * size..i * size + i];
-        x[i] = (x[i] - dot(row, &x[..i])) / factor[i * size + i];
+        x[i] = (x[i] - dot(row, &x[..i])) * factor[i * size + i];
     }
 }
 
 /// Solves `L^T x = x` in place.
 fn backward(factor: &[f64], size: usize, x: &mut [f64]) {
     for i in (0..size).rev() {
-        x[i] /= factor[i * size + i];
+        x[i] *= factor[i * size + i];
         let value = x[i];
         for (entry, l) in x[..i].iter_mut().zip(&factor[i * size..i * size + i]) {
             *entry -= l * value;
@@ -170,16 +171,10 @@ impl Quadratic {
     /// The same under `rows`.
     pub fn solve(&mut self, rows: &Rows) -> Outcome {
         self.solve_free();
-        let size = self.size;
-        for row in 0..rows.equalities {
-            let off = dot(rows.normal(size, row), &self.step) - rows.offsets[row];
-            match self.add(rows, row, off) {
-                Outcome::Solved => {}
-                // A dependent equation that holds adds nothing.
-                Outcome::Infeasible if off.abs() < MET.sqrt() => {}
-                other => return other,
-            }
+        if rows.equalities > 0 && !self.meet_equations(rows) {
+            return Outcome::Infeasible;
         }
+        let size = self.size;
         // Every pass adds a row for good or ends; the bound is for arithmetic gone wrong.
         for _ in 0..4 * (size + rows.offsets.len()) {
             let (mut worst, mut row) = (MET, usize::MAX);
@@ -214,15 +209,56 @@ impl Quadratic {
         })
     }
 
+    /// Moves from the free minimum to the one on all equations at once; false when they exclude each other.
+    ///
+    /// In `y = L^T p` the way is the shortest one: `y - y_free` in the span of the images, each image
+    /// times `y` the right-hand side.
+    fn meet_equations(&mut self, rows: &Rows) -> bool {
+        let size = self.size;
+        for row in 0..rows.equalities {
+            self.image.clear();
+            self.image.extend_from_slice(rows.normal(size, row));
+            forward(&self.factor, size, &mut self.image);
+            self.split();
+            let whole = dot(&self.image, &self.image);
+            if dot(&self.outside, &self.outside) > DEPENDENT * whole {
+                self.active.push(row);
+                self.images.extend_from_slice(&self.image);
+                self.extend_basis();
+            }
+        }
+        self.inside.clear();
+        for (k, &row) in self.active.iter().enumerate() {
+            let column = &self.triangle[k * (k + 1) / 2..(k + 1) * (k + 2) / 2];
+            let off = rows.offsets[row] - dot(rows.normal(size, row), &self.step);
+            let rest = off - dot(&column[..k], &self.inside);
+            self.inside.push(rest / column[k]);
+        }
+        self.direction.clear();
+        self.direction.resize(size, 0.0);
+        for (along, basis) in self.inside.iter().zip(self.basis.chunks_exact(size)) {
+            for (entry, b) in self.direction.iter_mut().zip(basis) {
+                *entry += along * b;
+            }
+        }
+        backward(&self.factor, size, &mut self.direction);
+        self.step.iter_mut().zip(&self.direction).for_each(|(p, d)| *p += d);
+        self.solve_triangle();
+        self.multipliers.extend(self.inside.iter().map(|along| -along));
+        // Those that depend on others hold by themselves, or never.
+        (0..rows.equalities).all(|row| {
+            let off = dot(rows.normal(size, row), &self.step) - rows.offsets[row];
+            self.active.contains(&row) || off.abs() < MET.sqrt()
+        })
+    }
+
     /// Moves to the minimum with a violated row active as well, dropping those that let go.
     fn add(&mut self, rows: &Rows, row: usize, violation: f64) -> Outcome {
         let size = self.size;
-        // An equation missed from below is met from below.
-        let sign = if violation < 0.0 { -1.0 } else { 1.0 };
-        let mut violation = violation.abs();
+        let mut violation = violation;
         let mut multiplier = 0.0;
         self.image.clear();
-        self.image.extend(rows.normal(size, row).iter().map(|n| sign * n));
+        self.image.extend_from_slice(rows.normal(size, row));
         forward(&self.factor, size, &mut self.image);
         let whole = dot(&self.image, &self.image);
         loop {
@@ -251,9 +287,10 @@ impl Quadratic {
             multiplier += step;
             if whole_move <= length {
                 self.active.push(row);
-                self.multipliers.push(sign * multiplier);
-                self.image.iter_mut().for_each(|y| *y *= sign);
+                self.multipliers.push(multiplier);
                 self.images.extend_from_slice(&self.image);
+                // Coefficients have overwritten the components.
+                self.split();
                 self.extend_basis();
                 return Outcome::Solved;
             }
@@ -313,9 +350,8 @@ impl Quadratic {
         }
     }
 
-    /// Adds `image`, which has a part outside the basis.
+    /// Adds `image`, split last, which has a part outside the basis.
     fn extend_basis(&mut self) {
-        self.split();
         let norm = dot(&self.outside, &self.outside).sqrt();
         self.triangle.extend_from_slice(&self.inside);
         self.triangle.push(norm);
@@ -331,6 +367,7 @@ impl Quadratic {
         for active in images.chunks_exact(size) {
             self.image.clear();
             self.image.extend_from_slice(active);
+            self.split();
             self.extend_basis();
         }
         self.images = images;

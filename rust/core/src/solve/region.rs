@@ -18,13 +18,18 @@ impl Disc {
     /// How far outside a point is; negative inside.
     fn excess(&self, z: &[f64]) -> f64 {
         let reach = self.scale.map_or(self.radius, |k| self.radius * z[k]);
-        z[self.first].hypot(z[self.first + 1]) - reach
+        length(z, self.first) - reach
     }
 
     /// Length of the gradient of the excess: normals of rows are of length 1.
     fn slope(&self) -> f64 {
         if self.scale.is_some() { 1.0_f64.hypot(self.radius) } else { 1.0 }
     }
+}
+
+/// Length of two unknowns; squares of what counts here neither overflow nor vanish.
+fn length(z: &[f64], first: usize) -> f64 {
+    (z[first] * z[first] + z[first + 1] * z[first + 1]).sqrt()
 }
 
 /// A convex region.
@@ -106,7 +111,7 @@ impl Region {
             rows.offsets.push(offset - dot(self.linear.normal(self.size, k), z));
         }
         for disc in &self.discs {
-            let norm = z[disc.first].hypot(z[disc.first + 1]);
+            let norm = length(z, disc.first);
             // At the centre every direction is a tangent's; a step from there is brought back later.
             let (x, y) = if norm > 0.0 {
                 (z[disc.first] / norm, z[disc.first + 1] / norm)
@@ -133,7 +138,7 @@ impl Region {
                 continue;
             };
             let (i, j) = (disc.first, disc.first + 1);
-            let norm = z[i].hypot(z[j]);
+            let norm = length(z, i);
             if norm > 0.0 {
                 let (x, y) = (z[i] / norm, z[j] / norm);
                 let weight = multiplier / (norm * disc.slope());
