@@ -19,7 +19,9 @@ from tdcr import constant_curvature
 from tdcr._batch import ShapeBatch, forward_batch
 from tdcr._core import (
     Backbone,
+    Bounds,
     ConstantCurvatureSettings,
+    InverseSettings,
     LinkageSettings,
     Robot,
     Shape,
@@ -28,14 +30,28 @@ from tdcr._core import (
     jacobian,
 )
 from tdcr._core import __version__ as __version__
+from tdcr._dexterity import Manipulability, manipulability
+from tdcr._inverse import (
+    Inverse,
+    InverseBatch,
+    inverse,
+    inverse_batch,
+    inverse_solutions,
+    track,
+)
 from tdcr._status import Status
 from tdcr.errors import InvalidInput, NotConverged, TdcrError
 
 __all__ = [
     "Backbone",
+    "Bounds",
     "ConstantCurvatureSettings",
     "InvalidInput",
+    "Inverse",
+    "InverseBatch",
+    "InverseSettings",
     "LinkageSettings",
+    "Manipulability",
     "NotConverged",
     "Robot",
     "Shape",
@@ -46,5 +62,10 @@ __all__ = [
     "constant_curvature",
     "forward",
     "forward_batch",
+    "inverse",
+    "inverse_batch",
+    "inverse_solutions",
     "jacobian",
+    "manipulability",
+    "track",
 ]

@@ -9,7 +9,9 @@ from tdcr._status import Status
 
 __all__ = [
     "Backbone",
+    "Bounds",
     "ConstantCurvatureSettings",
+    "InverseSettings",
     "LinkageSettings",
     "Robot",
     "Shape",
@@ -21,6 +23,9 @@ __all__ = [
     "_displacements_from_arc",
     "_fields",
     "_forward_batch",
+    "_inverse",
+    "_inverse_batch",
+    "_inverse_solutions",
     "_rotation_vector",
     "_rust_defaults",
     "_shape",
@@ -243,6 +248,58 @@ class Shape:
     def __hash__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
 
+@final
+class Bounds:
+    def __new__(
+        cls,
+        *,
+        displacement: tuple[_Floats, _Floats] | None = None,
+        curvature: _Floats | None = None,
+        length: tuple[_Floats, _Floats] | None = None,
+    ) -> Self: ...
+    @property
+    def displacement(self) -> tuple[Any, Any] | None: ...
+    @property
+    def curvature(self) -> float | tuple[float, ...] | None: ...
+    @property
+    def length(self) -> tuple[Any, Any] | None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class InverseSettings:
+    def __new__(
+        cls,
+        *,
+        position_tolerance: float = 1e-10,
+        rotation_tolerance: float = 1e-10,
+        position_weight: _Floats = 1.0,
+        rotation_weight: _Floats | None = None,
+        starts: int = 200,
+        max_iterations: int = 50,
+        seed: int = 0,
+    ) -> Self: ...
+    @property
+    def position_tolerance(self) -> float: ...
+    @property
+    def rotation_tolerance(self) -> float: ...
+    @property
+    def position_weight(self) -> float | tuple[float, ...]: ...
+    @property
+    def rotation_weight(self) -> float | tuple[float, ...] | None: ...
+    @property
+    def starts(self) -> int: ...
+    @property
+    def max_iterations(self) -> int: ...
+    @property
+    def seed(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
 def forward(
     robot: Robot,
     displacements: ArrayLike,
@@ -267,6 +324,36 @@ def _forward_batch(
     fields: list[str],
     threads: int | None,
     progress: Callable[[int], object] | None,
+) -> dict[str, Any]: ...
+def _inverse(
+    robot: Robot,
+    target: ArrayLike,
+    model: str,
+    start: ArrayLike | None,
+    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
+    settings: LinkageSettings | ConstantCurvatureSettings | None,
+    search: InverseSettings | None,
+) -> tuple[_Array, Status, str, float, float, int, int]: ...
+def _inverse_solutions(
+    robot: Robot,
+    target: ArrayLike,
+    model: str,
+    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
+    settings: LinkageSettings | ConstantCurvatureSettings | None,
+    search: InverseSettings | None,
+) -> list[tuple[tuple[_Array, Status, str, float, float, int, int], int]]: ...
+def _inverse_batch(
+    robot: Robot,
+    targets: ArrayLike,
+    *,
+    model: str,
+    start: ArrayLike | None,
+    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
+    settings: LinkageSettings | ConstantCurvatureSettings | None,
+    search: InverseSettings | None,
+    threads: int | None,
+    progress: Callable[[int], object] | None,
+    chain: bool,
 ) -> dict[str, Any]: ...
 def _arc_from_displacements(
     displacements: ArrayLike,

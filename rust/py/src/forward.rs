@@ -140,14 +140,14 @@ fn one_row(robot: &Bound<'_, Robot>, displacements: &Bound<'_, PyAny>) -> PyResu
 
 /// A model by name with its settings.
 #[derive(Clone, Copy)]
-enum Choice {
+pub(crate) enum Choice {
     Linkage(LinkageSettings),
     ConstantCurvature(ConstantCurvatureSettings),
 }
 
 impl Choice {
     /// Checks the name, and that the settings are those of this model.
-    fn new(model: &str, settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+    pub(crate) fn new(model: &str, settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         match model {
             "linkage" => {
                 let given = own_settings::<settings::LinkageSettings>(model, settings)?;

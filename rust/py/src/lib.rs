@@ -9,9 +9,11 @@
 
 mod arguments;
 mod backbone;
+mod bounds;
 mod constant_curvature;
 mod convert;
 mod forward;
+mod inverse;
 mod long_call;
 mod robot;
 mod settings;
@@ -26,15 +28,21 @@ mod _core {
     #[pymodule_export]
     use crate::backbone::Backbone;
     #[pymodule_export]
+    use crate::bounds::Bounds;
+    #[pymodule_export]
     use crate::constant_curvature::{
         _arc_frames, _arc_from_displacements, _arc_jacobian, _displacements_from_arc,
     };
     #[pymodule_export]
     use crate::forward::{_fields, _forward_batch, forward, jacobian};
     #[pymodule_export]
+    use crate::inverse::{_inverse, _inverse_batch, _inverse_solutions};
+    #[pymodule_export]
     use crate::robot::Robot;
     #[pymodule_export]
-    use crate::settings::{_rust_defaults, ConstantCurvatureSettings, LinkageSettings};
+    use crate::settings::{
+        _rust_defaults, ConstantCurvatureSettings, InverseSettings, LinkageSettings,
+    };
     #[pymodule_export]
     use crate::shape::{_rotation_vector, _shape, Shape};
     #[pymodule_export]

@@ -5,10 +5,11 @@ use pyo3::types::{PyDict, PyTuple};
 
 use tdcr::InvalidInput;
 use tdcr::constant_curvature as cc;
+use tdcr::inverse;
 use tdcr::linkage;
 
-use crate::arguments::whole;
-use crate::convert::invalid;
+use crate::arguments::{OneOrMany, number, whole};
+use crate::convert::{invalid, one_or_tuple};
 
 /// How precisely and how long the linkage model solves each subsegment.
 ///
@@ -30,6 +31,14 @@ pub(crate) struct LinkageSettings(pub(crate) linkage::LinkageSettings);
 
 fn max_iterations(value: &Bound<'_, PyAny>) -> PyResult<usize> {
     whole("max_iterations", value)
+}
+
+fn starts(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    whole("starts", value)
+}
+
+fn seed(value: &Bound<'_, PyAny>) -> PyResult<u64> {
+    whole("seed", value).map(|seed| seed as u64)
 }
 
 #[pymethods]
@@ -144,6 +153,172 @@ impl ConstantCurvatureSettings {
     }
 }
 
+/// How precisely, how long and with which weights an inverse is sought.
+///
+/// Parameters
+/// ----------
+/// position_tolerance : float, optional
+///     Distance to the target that counts as reached [m].
+/// rotation_tolerance : float, optional
+///     Angle to the target that counts as reached [rad].
+/// position_weight : float or (float, float, float), optional
+///     Weight of the distance, or of its parts along the world axes; 0 leaves an axis out.
+/// rotation_weight : float or (float, float, float), optional
+///     What one radian counts, or one about each tool axis [m]; 0 leaves an axis free: (1, 1, 0) points
+///     the tool and lets it roll. Default: 0.3 of the robot's length. Weights decide what is nearest to
+///     a target out of reach.
+/// starts : int, optional
+///     Starts at most before a target counts as out of reach.
+/// max_iterations : int, optional
+///     Steps per start at most.
+/// seed : int, optional
+///     Of the random starts. The same seed gives the same answer on any number of threads.
+///
+/// Raises
+/// ------
+/// InvalidInput
+///     Tolerances that are not positive, weights that are negative, NaN or zero everywhere, no starts.
+#[pyclass(frozen, eq, module = "tdcr")]
+#[derive(Clone, PartialEq)]
+pub(crate) struct InverseSettings(pub(crate) inverse::InverseSettings);
+
+/// One number for three axes, or three.
+fn per_axis(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
+    let given = OneOrMany::extract(argument, value, number)?.into_vec();
+    match given.as_slice() {
+        [one] => Ok([*one; 3]),
+        &[x, y, z] => Ok([x, y, z]),
+        other => {
+            let got = format!("{} numbers", other.len());
+            Err(invalid(&InvalidInput::new(argument, "one number or three", got)))
+        }
+    }
+}
+
+fn position_weight(value: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
+    per_axis("position_weight", value)
+}
+
+/// Three numbers as one when they are the same.
+fn joined<'py>(py: Python<'py>, values: &[f64; 3]) -> PyResult<Bound<'py, PyAny>> {
+    let same = values.iter().all(|value| *value == values[0]);
+    one_or_tuple(py, if same { &values[..1] } else { values })
+}
+
+#[pymethods]
+impl InverseSettings {
+    #[new]
+    #[pyo3(
+        signature = (*, position_tolerance=1e-10, rotation_tolerance=1e-10, position_weight=[1.0; 3],
+            rotation_weight=None, starts=200, max_iterations=50, seed=0),
+        text_signature = "(*, position_tolerance=1e-10, rotation_tolerance=1e-10, \
+            position_weight=1.0, rotation_weight=None, starts=200, max_iterations=50, seed=0)"
+    )]
+    fn new(
+        position_tolerance: f64,
+        rotation_tolerance: f64,
+        #[pyo3(from_py_with = position_weight)] position_weight: [f64; 3],
+        rotation_weight: Option<&Bound<'_, PyAny>>,
+        #[pyo3(from_py_with = starts)] starts: usize,
+        #[pyo3(from_py_with = max_iterations)] max_iterations: usize,
+        #[pyo3(from_py_with = seed)] seed: u64,
+    ) -> PyResult<Self> {
+        let mut settings = inverse::InverseSettings {
+            position_tolerance,
+            rotation_tolerance,
+            position_weight,
+            starts,
+            max_iterations,
+            seed,
+            ..Default::default()
+        };
+        if let Some(weight) = rotation_weight {
+            settings.rotation_weight = per_axis("rotation_weight", weight)?.map(Some);
+        }
+        settings.validate().map_err(|e| invalid(&e))?;
+        Ok(Self(settings))
+    }
+
+    /// Distance that counts as reached [m].
+    #[getter]
+    fn position_tolerance(&self) -> f64 {
+        self.0.position_tolerance
+    }
+
+    /// Angle that counts as reached [rad].
+    #[getter]
+    fn rotation_tolerance(&self) -> f64 {
+        self.0.rotation_tolerance
+    }
+
+    /// Weight of the distance, one number or one per world axis.
+    #[getter]
+    fn position_weight<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        joined(py, &self.0.position_weight)
+    }
+
+    /// What one radian counts, one number or one per tool axis [m]; None: 0.3 of the robot's length.
+    #[getter]
+    fn rotation_weight<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let [Some(x), Some(y), Some(z)] = self.0.rotation_weight else { return Ok(None) };
+        joined(py, &[x, y, z]).map(Some)
+    }
+
+    /// Starts at most.
+    #[getter]
+    fn starts(&self) -> usize {
+        self.0.starts
+    }
+
+    /// Steps per start at most.
+    #[getter]
+    fn max_iterations(&self) -> usize {
+        self.0.max_iterations
+    }
+
+    /// Seed of the random starts.
+    #[getter]
+    fn seed(&self) -> u64 {
+        self.0.seed
+    }
+
+    fn __hash__(&self) -> u64 {
+        let settings = &self.0;
+        let weights = settings.rotation_weight.into_iter().flatten();
+        let floats = [settings.position_tolerance, settings.rotation_tolerance]
+            .into_iter()
+            .chain(settings.position_weight)
+            .chain(weights);
+        let bits = floats.map(|value| (value + 0.0).to_bits());
+        let counts = [settings.starts as u64, settings.max_iterations as u64, settings.seed];
+        bits.chain(counts).fold(0, |hash: u64, bits| hash.rotate_left(13) ^ bits)
+    }
+
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let (_, keywords) = slf.get().__getnewargs_ex__(slf.py())?;
+        let mut given = Vec::new();
+        for (name, value) in keywords {
+            given.push(format!("{name}={}", value.repr()?));
+        }
+        Ok(format!("InverseSettings({})", given.join(", ")))
+    }
+
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        let keywords = PyDict::new(py);
+        keywords.set_item("position_tolerance", self.position_tolerance())?;
+        keywords.set_item("rotation_tolerance", self.rotation_tolerance())?;
+        keywords.set_item("position_weight", self.position_weight(py)?)?;
+        keywords.set_item("rotation_weight", self.rotation_weight(py)?)?;
+        keywords.set_item("starts", self.starts())?;
+        keywords.set_item("max_iterations", self.max_iterations())?;
+        keywords.set_item("seed", self.seed())?;
+        Ok((PyTuple::empty(py), keywords))
+    }
+}
+
 /// Defaults of the core's settings by class name, for the test that compares them with Python's.
 #[pyfunction]
 pub(crate) fn _rust_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
@@ -158,5 +333,7 @@ pub(crate) fn _rust_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     values.set_item("coupling", curvature.coupling.as_str())?;
     values.set_item("extensible", curvature.extensible)?;
     defaults.set_item("ConstantCurvatureSettings", values)?;
+    let inverse = InverseSettings(inverse::InverseSettings::default());
+    defaults.set_item("InverseSettings", inverse.__getnewargs_ex__(py)?.1)?;
     Ok(defaults)
 }

@@ -89,6 +89,8 @@ pub(super) struct Reach {
     pub(super) draws: Vec<(f64, f64, f64)>,
     /// Freedoms of the arcs that the tendons have.
     pub(super) freedoms: usize,
+    /// What the bounds and the discs of the region hold back.
+    labels: (Vec<String>, Vec<String>),
 }
 
 impl Reach {
@@ -115,6 +117,7 @@ impl Reach {
         }
         let mut region = Region::new(size);
         let still = stillness(plan, tendons, &mut region);
+        let mut labels = (Vec::new(), Vec::new());
         let mut draws = Vec::with_capacity(count);
         for (i, segment) in plan.segments().enumerate() {
             let rest = segment.rest_length;
@@ -128,24 +131,39 @@ impl Reach {
             if width == 3 {
                 let mut normal = vec![0.0; size];
                 normal[first + 2] = 1.0;
-                region.bound(&normal, longest);
+                if region.bound(&normal, longest) {
+                    labels.0.push(format!("longest segment {i}"));
+                }
                 normal[first + 2] = -1.0;
-                region.bound(&normal, -shortest);
+                if region.bound(&normal, -shortest) {
+                    labels.0.push(format!("shortest segment {i}"));
+                }
                 if curvature < f64::INFINITY {
                     let scale = Some(first + 2);
                     region.add_disc(Disc { first, radius: curvature * rest, scale });
+                    labels.1.push(format!("curvature of segment {i}"));
                 }
                 widest = widest.min(curvature * rest * longest);
                 region.add_disc(Disc { first, radius: TURN, scale: None });
+                labels.1.push(format!("full turn of segment {i}"));
             } else {
                 widest = widest.min(curvature * rest);
                 region.add_disc(Disc { first, radius: widest, scale: None });
+                let what = if widest < TURN { "curvature" } else { "full turn" };
+                labels.1.push(format!("{what} of segment {i}"));
             }
             // Without an upper bound, starts are drawn up to twice the default one.
             draws.push((widest, shortest, longest.min(2.0 * STRETCH.1 * shortest.max(1.0))));
         }
-        bound_displacements(plan, bounds, tendons, &mut region);
-        Ok(Self { region, draws, freedoms: size - still })
+        bound_displacements(plan, bounds, tendons, &mut region, &mut labels.0);
+        Ok(Self { region, draws, freedoms: size - still, labels })
+    }
+
+    /// The bounds that hold a point back.
+    pub(super) fn holding(&self, point: &[f64]) -> Vec<&str> {
+        let (bounds, discs) = self.region.at_edge(point, 1e-9);
+        let bounds = bounds.into_iter().map(|k| self.labels.0[k].as_str());
+        bounds.chain(discs.into_iter().map(|k| self.labels.1[k].as_str())).collect()
     }
 }
 
@@ -183,7 +201,13 @@ pub(super) fn scale(plan: &Plan, unknown: usize) -> f64 {
     if unknown % plan.width() == 2 { plan.segment(segment).rest_length } else { 1.0 }
 }
 
-fn bound_displacements(plan: &Plan, bounds: &Bounds, tendons: usize, region: &mut Region) {
+fn bound_displacements(
+    plan: &Plan,
+    bounds: &Bounds,
+    tendons: usize,
+    region: &mut Region,
+    labels: &mut Vec<String>,
+) {
     let size = plan.width() * plan.segment_count();
     for k in 0..tendons {
         let (lower, mut upper) =
@@ -194,10 +218,14 @@ fn bound_displacements(plan: &Plan, bounds: &Bounds, tendons: usize, region: &mu
         }
         let mut row: Vec<f64> = (0..size).map(|j| plan.by_unknown(k, j) * scale(plan, j)).collect();
         let at_rest: f64 = (0..size).map(|j| row[j] * rest(plan, j)).sum();
-        region.bound(&row, upper + at_rest);
+        if region.bound(&row, upper + at_rest) {
+            labels.push(format!("release of tendon {k}"));
+        }
         for entry in &mut row {
             *entry = -*entry;
         }
-        region.bound(&row, -lower - at_rest);
+        if region.bound(&row, -lower - at_rest) {
+            labels.push(format!("pull of tendon {k}"));
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! The inverse of the constant-curvature model.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -36,7 +37,16 @@ pub struct Answer {
 #[derive(Clone, Debug)]
 pub struct Workspace<'a> {
     chain: Chain<'a>,
-    search: Search,
+    search: Search<'a>,
+}
+
+impl<'a> Workspace<'a> {
+    /// Ends solves before their next start when the flag is set.
+    #[must_use]
+    pub fn stopped_by(mut self, stop: &'a AtomicBool) -> Self {
+        self.search.stop = Some(stop);
+        self
+    }
 }
 
 /// A robot prepared for inverse solves with the constant-curvature model.
@@ -70,9 +80,15 @@ impl<'a> ConstantCurvatureInverse<'a> {
         self.robot
     }
 
+    /// The choices it was prepared with.
+    #[must_use]
+    pub fn settings(&self) -> &InverseSettings {
+        &self.settings
+    }
+
     /// Buffers for this inverse.
     #[must_use]
-    pub fn workspace(&'a self) -> Workspace<'a> {
+    pub fn workspace(&self) -> Workspace<'_> {
         Workspace {
             chain: Chain::new(self.robot, self.plan, &self.settings),
             search: Search::default(),
@@ -84,7 +100,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         &self,
         target: &Target,
         start: Option<&[Arc]>,
-        work: &mut Workspace<'a>,
+        work: &mut Workspace<'_>,
     ) -> Answer {
         work.chain.aim(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
@@ -99,7 +115,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// Seeks again from where the last solve in `work` ended, as along a path; from other starts only when
     /// that fails.
-    pub fn follow(&self, target: &Target, work: &mut Workspace<'a>) -> Answer {
+    pub fn follow(&self, target: &Target, work: &mut Workspace<'_>) -> Answer {
         work.chain.aim(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
         let found = work.search.run(&mut work.chain, &self.reach.region, effort, |k, point| {
@@ -114,7 +130,12 @@ impl<'a> ConstantCurvatureInverse<'a> {
     /// that of the others, and how many starts led there.
     #[must_use]
     pub fn solutions(&self, target: &Target) -> Vec<Solution> {
-        let mut work = self.workspace();
+        self.solutions_in(target, &mut self.workspace())
+    }
+
+    /// The same in given buffers.
+    #[must_use]
+    pub fn solutions_in(&self, target: &Target, work: &mut Workspace<'_>) -> Vec<Solution> {
         work.chain.aim(*target);
         let effort = Effort { starts: 1, ..self.effort(&work.chain, 1) };
         let mut distinct: Vec<(Vec<f64>, Solution)> = Vec::new();
@@ -135,7 +156,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
             }
             let energy = work.chain.energy(point, &mut slope);
             let answer = Self::answer(found, &work.chain);
-            let solution = Solution { arcs: self.arcs(&work), energy, hits: 1, answer };
+            let solution = Solution { arcs: self.arcs(work), energy, hits: 1, answer };
             distinct.push((point.clone(), solution));
         }
         distinct.sort_by(|(_, a), (_, b)| a.energy.total_cmp(&b.energy));
@@ -177,6 +198,38 @@ impl<'a> ConstantCurvatureInverse<'a> {
                 sum + self.plan.by_unknown(k, j) * moved
             });
         }
+    }
+
+    /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
+    #[must_use]
+    pub fn message(&self, answer: &Answer, work: &Workspace<'_>) -> String {
+        let Answer { distance, angle, .. } = *answer;
+        let angle = if angle > 0.0 { format!(" and {angle:.6} rad") } else { String::new() };
+        let off = format!("{distance:.6} m{angle} off the target");
+        let held = self.reach.holding(&work.search.point);
+        let held = if held.is_empty() {
+            String::new()
+        } else {
+            format!("; at its bound: {}", held.join(", "))
+        };
+        match answer.status {
+            Status::Converged => String::new(),
+            Status::Unreachable => {
+                format!("the nearest answer of {} starts is {off}{held}", answer.starts)
+            }
+            Status::Infeasible => "the bounds leave the robot no shape".to_owned(),
+            Status::IterationLimit if self.meets(answer) => {
+                "the target is met, but not with the least bending energy nearby".to_owned()
+            }
+            Status::IterationLimit | Status::NumericalError => {
+                format!("stopped before a nearest answer was found: {off}{held}")
+            }
+        }
+    }
+
+    fn meets(&self, answer: &Answer) -> bool {
+        answer.distance <= self.settings.position_tolerance
+            && answer.angle <= self.settings.rotation_tolerance
     }
 
     fn unknowns(&self, arcs: &[Arc], point: &mut Vec<f64>) {

@@ -54,7 +54,7 @@ pub fn invert_rows(
             .zip(displacements.par_chunks_mut((ROWS_PER_JOB * tendons).max(1)))
             .enumerate()
             .for_each_init(
-                || inverse.workspace(),
+                || inverse.workspace().stopped_by(&control.stop),
                 |work, (job, ((targets, answers), displacements))| {
                     for (i, (target, answer)) in targets.iter().zip(answers).enumerate() {
                         if control.stop.load(Ordering::Relaxed) {
@@ -83,7 +83,7 @@ pub fn invert_path(
 ) -> Option<InverseRows> {
     let tendons = inverse.robot().tendons().len();
     let mut rows = InverseRows::blank(targets.len(), tendons);
-    let mut work = inverse.workspace();
+    let mut work = inverse.workspace().stopped_by(&control.stop);
     for (i, target) in targets.iter().enumerate() {
         if control.stop.load(Ordering::Relaxed) {
             return None;

@@ -1,5 +1,7 @@
 //! Descents from many starts until one meets the target.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::solve::fit::{Ending, Problem, Purpose, Workspace};
 use crate::solve::region::Region;
 use crate::status::Status;
@@ -13,10 +15,12 @@ const LOWER: usize = 500;
 
 /// Buffers of a search, and the point it found.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Search {
+pub(super) struct Search<'a> {
     pub(super) fit: Workspace<6>,
     /// The unknowns found.
     pub(super) point: Vec<f64>,
+    /// Ends the search before its next start when it is set.
+    pub(super) stop: Option<&'a AtomicBool>,
     /// Where descents ended that did not meet the target, by their squared residual, best first.
     candidates: Vec<(f64, Vec<f64>)>,
 }
@@ -38,7 +42,7 @@ pub(super) struct Effort {
     pub(super) redundant: bool,
 }
 
-impl Search {
+impl Search<'_> {
     /// Tries `start(k, point)` for k = 0, 1, ... until a descent meets the target; else finds the point
     /// nearest to it. `point` holds the answer whatever the status.
     pub(super) fn run<P: Problem<6>>(
@@ -51,6 +55,9 @@ impl Search {
         self.fit.iterations = 0;
         self.candidates.clear();
         for k in 0..effort.starts {
+            if self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                return self.found(Status::IterationLimit, k);
+            }
             start(k, &mut self.point);
             if !self.fit.restore(region, &mut self.point) {
                 if k == 0 {

@@ -70,11 +70,9 @@ impl Region {
         }
     }
 
-    /// Adds `normal . z <= bound`, unless the bound is infinite.
-    pub fn bound(&mut self, normal: &[f64], bound: f64) {
-        if bound < f64::INFINITY {
-            self.push(normal, bound);
-        }
+    /// Adds `normal . z <= bound`, unless the bound is infinite or the normal zero; returns whether.
+    pub fn bound(&mut self, normal: &[f64], bound: f64) -> bool {
+        bound < f64::INFINITY && self.push(normal, bound)
     }
 
     fn push(&mut self, normal: &[f64], value: f64) -> bool {
@@ -89,6 +87,20 @@ impl Region {
     /// Adds a disc.
     pub fn add_disc(&mut self, disc: Disc) {
         self.discs.push(disc);
+    }
+
+    /// Bounds, in the order they were added, and discs, in theirs, on whose edge a point lies to `within`.
+    #[must_use]
+    pub fn at_edge(&self, z: &[f64], within: f64) -> (Vec<usize>, Vec<usize>) {
+        let first = self.linear.equalities;
+        let bounds = (first..self.linear.offsets.len())
+            .filter(|k| {
+                dot(self.linear.normal(self.size, *k), z) >= self.linear.offsets[*k] - within
+            })
+            .map(|k| k - first);
+        let discs = self.discs.iter().enumerate();
+        let discs = discs.filter(|(_, disc)| disc.excess(z) >= -within).map(|(k, _)| k);
+        (bounds.collect(), discs.collect())
     }
 
     /// Largest violation at a point; 0 inside.
