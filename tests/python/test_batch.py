@@ -185,18 +185,32 @@ def test_progress_bar_goes_to_stderr():
     assert done.stdout == ""
 
 
-def test_ctrl_c_interrupts_a_long_batch():
-    code = """
+@pytest.mark.parametrize(
+    "call",
+    [
+        'tdcr.forward_batch(robot, np.full((40_000, 1), -0.01), model="linkage")',
+        # Out of reach: every row takes all its starts.
+        'tdcr.inverse_batch(finger, np.full((40_000, 3), 0.5), model="constant_curvature")',
+        'tdcr.track(finger, np.full((40_000, 3), 0.5), model="constant_curvature")',
+        'tdcr.inverse(finger, [0.5] * 3, model="constant_curvature", search=endless)',
+        'tdcr.inverse_solutions(finger, [0.5] * 3, model="constant_curvature", search=endless)',
+    ],
+)
+def test_ctrl_c_interrupts_long_calls(call):
+    code = f"""
         import signal
         import numpy as np, tdcr
         # A shell's background job starts with SIGINT ignored.
         signal.signal(signal.SIGINT, signal.default_int_handler)
         helix = tdcr.Tendon.helical(0.0, 0.01, turns=0.3)
         robot = tdcr.Robot(tdcr.Backbone(1.0, 500), [helix])
-        rows = np.full((40_000, 1), -0.01)
+        ends = [end for end in (3, 6, 9) for _ in range(3)]
+        tendons = [tdcr.Tendon(2.1 * k, 0.01, end=end) for k, end in enumerate(ends)]
+        finger = tdcr.Robot(tdcr.Backbone(0.2, 9), tendons)
+        endless = tdcr.InverseSettings(starts=10**9)
         print("ready", flush=True)
         try:
-            tdcr.forward_batch(robot, rows, model="linkage")
+            {call}
         except KeyboardInterrupt:
             print("interrupted", flush=True)
     """

@@ -141,6 +141,9 @@ impl<'a> ConstantCurvatureInverse<'a> {
         let mut distinct: Vec<(Vec<f64>, Solution)> = Vec::new();
         let mut slope = vec![0.0; self.reach.region.size()];
         for k in 0..self.settings.starts {
+            if work.search.stopped() {
+                break;
+            }
             let found = work.search.run(&mut work.chain, &self.reach.region, effort, |_, point| {
                 self.start(target, k, point);
             });

@@ -55,7 +55,7 @@ impl Search<'_> {
         self.fit.iterations = 0;
         self.candidates.clear();
         for k in 0..effort.starts {
-            if self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            if self.stopped() {
                 return self.found(Status::IterationLimit, k);
             }
             start(k, &mut self.point);
@@ -77,6 +77,11 @@ impl Search<'_> {
         }
         let status = self.nearest(problem, region, effort);
         self.found(status, effort.starts)
+    }
+
+    /// Whether it was told to end.
+    pub(super) fn stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
     fn found(&self, status: Status, starts: usize) -> Found {
