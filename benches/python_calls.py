@@ -1,7 +1,7 @@
 """What a call from Python costs on top of the core, and how batches scale.
 
 The core's time per solve is taken from a batch on one thread, in the same run and on the same rows;
-the last column is the gain of a batch on two threads.
+the last column is the gain of a batch on two threads (a path is followed on one).
 """
 
 from __future__ import annotations
@@ -36,38 +36,76 @@ def robot(n: int, kind: str) -> tdcr.Robot:
     return tdcr.Robot(tdcr.Backbone(0.02 * n, n), tendons)
 
 
-def batch(trunk: tdcr.Robot, rows: Array, threads: int) -> float:
-    """Return the seconds per row of a batch."""
-    solve = partial(tdcr.forward_batch, trunk, rows, model="linkage", threads=threads)
-    return best(solve, 1) / len(rows)
+def line(name: str, many: Callable[[int], object], one: Callable[[int], object], rows: int) -> None:
+    """Print a line: `many(threads)` solves all rows at once, `one(i)` a row alone."""
+    core = best(partial(many, 1), 1) / rows
 
-
-def singles(trunk: tdcr.Robot, rows: Array) -> float:
-    """Return the seconds per call, each result dropped before the next call."""
-
+    # Each result is dropped before the next call.
     def calls() -> None:
-        for row in rows:
-            tdcr.forward(trunk, row, model="linkage")
+        for i in range(rows):
+            one(i)
 
-    return best(calls, 1) / len(rows)
+    call = best(calls, 1) / rows
+    gain = core / (best(partial(many, 2), 1) / rows)
+    print(
+        f"{name:32} {core * 1e6:10.2f} {call * 1e6:10.2f} {(call - core) * 1e6:8.2f} {gain:7.2f}x"
+    )
+
+
+def linkages(rng: np.random.Generator) -> None:
+    """Forward solves of the linkage model."""
+    for kind in ("uniform", "varied"):
+        for n in (1, 10, 100, 1000):
+            trunk = robot(n, kind)
+            rows = -0.02 * n * rng.uniform(0.02, 0.08, (64, 2))
+            rows = np.tile(rows, (max(1, 400 // n), 1))
+            forward = partial(tdcr.forward_batch, trunk, rows, model="linkage")
+            assert forward().ok.all()
+            line(
+                f"linkage, {kind}, n = {n}",
+                lambda threads, forward=forward: forward(threads=threads),
+                lambda i, trunk=trunk, rows=rows: tdcr.forward(trunk, rows[i], model="linkage"),
+                len(rows),
+            )
+
+
+def inverses(rng: np.random.Generator) -> None:
+    """Inverses of the constant-curvature model, alone and along a path."""
+    ends = [10 * (k // 3 + 1) for k in range(9)]
+    tendons = [tdcr.Tendon(2.1 * k, 0.0045, end=end) for k, end in enumerate(ends)]
+    trunk = tdcr.Robot(tdcr.Backbone([0.06, 0.0625, 0.064], [10] * 3), tendons)
+    rows = rng.normal(size=(2000, 9)) * 0.003
+    t = np.linspace(0, 1, 2000)[:, None]
+    solve = partial(tdcr.inverse, trunk, model="constant_curvature")
+    targets = tdcr.forward_batch(trunk, rows, model="constant_curvature").tip
+    line(
+        "inverse, frames",
+        lambda threads: tdcr.inverse_batch(
+            trunk, targets, model="constant_curvature", threads=threads
+        ),
+        lambda i: solve(targets[i]),
+        len(rows),
+    )
+    t = np.linspace(0, 1, len(rows))[:, None]
+    pulls = rows[:1] * (1 - t) + rows[1:2] * t
+    path = tdcr.forward_batch(trunk, pulls, model="constant_curvature").tip
+    follow = partial(tdcr.track, trunk, path, model="constant_curvature", start=pulls[0])
+    found = follow()
+    assert found.ok.all()
+    line(
+        "inverse, along a path",
+        lambda threads: follow(),
+        lambda i: solve(path[i], start=found.displacements[max(i - 1, 0)]),
+        len(rows),
+    )
 
 
 def main() -> None:
     """Print a table."""
     rng = np.random.default_rng(0)
-    print(f"{'robot':>8} {'n':>5} {'core [us]':>10} {'call [us]':>10} {'on top':>8} {'threads':>8}")
-    for kind in ("uniform", "varied"):
-        for n in (1, 10, 100, 1000):
-            trunk = robot(n, kind)
-            rows = -0.02 * n * rng.uniform(0.02, 0.08, (64, 2))
-            many = np.tile(rows, (max(1, 400 // n), 1))
-            assert tdcr.forward_batch(trunk, rows, model="linkage").ok.all()
-            # The same rows in both: pulls differ in how many steps they take.
-            core, call = batch(trunk, many, 1), singles(trunk, rows)
-            print(
-                f"{kind:>8} {n:5} {core * 1e6:10.2f} {call * 1e6:10.2f} "
-                f"{(call - core) * 1e6:8.2f} {core / batch(trunk, many, 2):7.2f}x"
-            )
+    print(f"{'':32} {'core [us]':>10} {'call [us]':>10} {'on top':>8} {'threads':>8}")
+    linkages(rng)
+    inverses(rng)
 
 
 if __name__ == "__main__":

@@ -234,9 +234,8 @@ def main() -> None:
     trunk = robot()
     lines = forward(trunk, 2_000 if quick else 1_000_000)
     lines += inverse(trunk, 5 if quick else 300)
-    print(
-        f"\n{'three segments, nine tendons':42} {'each':>12} {'ratio':>8} {'first':>7} {'solved':>7}"
-    )
+    title = "three segments, nine tendons"
+    print(f"\n{title:42} {'each':>12} {'ratio':>8} {'first':>7} {'solved':>7}")
     for line in lines:
         print(
             f"{line.name:42} {line.seconds * 1e6:9.3f} us {line.ratio:8.2f} "

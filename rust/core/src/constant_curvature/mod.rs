@@ -5,10 +5,10 @@ pub(crate) mod bent;
 mod chain;
 mod kinematics;
 mod mapping;
+mod plan;
 
 pub use arc::Arc;
-pub use chain::{
-    ConstantCurvature, ConstantCurvatureSettings, Coupling, Plan, Workspace, displacements,
-};
+pub use chain::{ConstantCurvature, Workspace};
 pub use kinematics::{frames, tip_derivative};
 pub use mapping::{Fit, Length, Mapping};
+pub use plan::{ConstantCurvatureSettings, Coupling, Plan, displacements};

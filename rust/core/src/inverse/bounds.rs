@@ -1,7 +1,5 @@
 //! What an inverse may use, and the region of unknowns it leaves.
 
-use nalgebra::DMatrix;
-
 use crate::constant_curvature::Plan;
 use crate::error::InvalidInput;
 use crate::solve::region::{Disc, Region};
@@ -78,8 +76,6 @@ pub struct Bounds {
 const TURN: f64 = std::f64::consts::TAU;
 /// Shortest and longest segment over its rest length, unless bounds say otherwise.
 const STRETCH: (f64, f64) = (0.5, 2.0);
-/// Directions that tendons move by less than this share of the most count as not moved.
-const DEFICIENT: f64 = 1e-10;
 
 /// The region of the unknowns of `Chain`, and where random starts are drawn.
 #[derive(Clone, Debug)]
@@ -116,7 +112,11 @@ impl Reach {
             return Err(InvalidInput::new("bounds.length", expected, "one that is not"));
         }
         let mut region = Region::new(size);
-        let still = stillness(plan, tendons, &mut region);
+        for direction in plan.unmoved() {
+            let normal: Vec<f64> = (0..size).map(|j| direction[j] * plan.unit(j)).collect();
+            let at_rest = (0..size).map(|j| normal[j] * rest(plan, j)).sum();
+            region.equate(&normal, at_rest);
+        }
         let mut labels = (Vec::new(), Vec::new());
         let mut draws = Vec::with_capacity(count);
         for (i, segment) in plan.segments().enumerate() {
@@ -156,7 +156,7 @@ impl Reach {
             draws.push((widest, shortest, longest.min(2.0 * STRETCH.1 * shortest.max(1.0))));
         }
         bound_displacements(plan, bounds, tendons, &mut region, &mut labels.0);
-        Ok(Self { region, draws, freedoms: size - still, labels })
+        Ok(Self { region, draws, freedoms: size - plan.unmoved().len(), labels })
     }
 
     /// The bounds that hold a point back.
@@ -167,38 +167,9 @@ impl Reach {
     }
 }
 
-/// Unknowns that no tendon moves keep their rest values; returns how many.
-fn stillness(plan: &Plan, tendons: usize, region: &mut Region) -> usize {
-    let size = plan.width() * plan.segment_count();
-    // Square at least, so that the decomposition has all directions.
-    let matrix = DMatrix::from_fn(tendons.max(size), size, |k, j| {
-        if k < tendons { plan.by_unknown(k, j) * scale(plan, j) } else { 0.0 }
-    });
-    let decomposition = matrix.svd(false, true);
-    let largest = decomposition.singular_values.max();
-    let mut still = 0;
-    if let Some(directions) = &decomposition.v_t {
-        for (value, direction) in decomposition.singular_values.iter().zip(directions.row_iter()) {
-            if *value <= DEFICIENT * largest {
-                let normal: Vec<f64> = direction.iter().copied().collect();
-                let at_rest = (0..size).map(|j| normal[j] * rest(plan, j)).sum();
-                region.equate(&normal, at_rest);
-                still += 1;
-            }
-        }
-    }
-    still
-}
-
 /// Value of an unknown at rest.
 pub(super) fn rest(plan: &Plan, unknown: usize) -> f64 {
     if unknown % plan.width() == 2 { 1.0 } else { 0.0 }
-}
-
-/// From an unknown of `Chain` to one of the plan: lengths are over their rest lengths.
-pub(super) fn scale(plan: &Plan, unknown: usize) -> f64 {
-    let segment = unknown / plan.width();
-    if unknown % plan.width() == 2 { plan.segment(segment).rest_length } else { 1.0 }
 }
 
 fn bound_displacements(
@@ -216,7 +187,7 @@ fn bound_displacements(
         if plan.segments().any(|segment| segment.own == [k]) {
             upper = upper.min(0.0);
         }
-        let mut row: Vec<f64> = (0..size).map(|j| plan.by_unknown(k, j) * scale(plan, j)).collect();
+        let mut row: Vec<f64> = (0..size).map(|j| plan.by_unknown(k, j)).collect();
         let at_rest: f64 = (0..size).map(|j| row[j] * rest(plan, j)).sum();
         if region.bound(&row, upper + at_rest) {
             labels.push(format!("release of tendon {k}"));

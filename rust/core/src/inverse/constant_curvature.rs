@@ -7,7 +7,7 @@ use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::bounds::{Bounds, Reach, rest, scale};
+use super::bounds::{Bounds, Reach, rest};
 use super::chain::Chain;
 use super::search::{Effort, Found, Search};
 use super::{InverseSettings, Target};
@@ -197,8 +197,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         for (k, displacement) in place.iter_mut().enumerate() {
             let unknowns = work.search.point.iter().enumerate();
             *displacement = unknowns.fold(0.0, |sum, (j, value)| {
-                let moved = (value - rest(self.plan, j)) * scale(self.plan, j);
-                sum + self.plan.by_unknown(k, j) * moved
+                sum + self.plan.by_unknown(k, j) * (value - rest(self.plan, j))
             });
         }
     }

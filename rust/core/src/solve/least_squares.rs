@@ -53,3 +53,20 @@ impl PseudoInverse {
         &self.matrix * right
     }
 }
+
+/// Orthonormal directions that a matrix with finite entries takes to zero.
+#[must_use]
+pub fn null_space(matrix: &DMatrix<f64>) -> Vec<DVector<f64>> {
+    let (rows, columns) = matrix.shape();
+    // At least square, so that the decomposition has all directions.
+    let padded = matrix.clone().resize(rows.max(columns), columns, 0.0);
+    if columns == 0 {
+        return Vec::new();
+    }
+    let decomposition = padded.svd(false, true);
+    let values = &decomposition.singular_values;
+    let small = DEFICIENT * values.max();
+    let directions = decomposition.v_t.iter().flat_map(|v| v.row_iter());
+    let lost = values.iter().zip(directions).filter(|(value, _)| **value <= small);
+    lost.map(|(_, direction)| direction.transpose()).collect()
+}
