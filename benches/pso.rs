@@ -31,7 +31,7 @@ fn moves(c: &mut Criterion) {
                 PsoSettings { particles: 30, max_iterations: MOVES, stagnation: None, ..settings };
             let mut swarm = Swarm::new(settings, &vec![-1.0; n], &vec![1.0; n]).unwrap();
             // A value for every particle that falls every time: all leaders change all the time.
-            let mut run = |swarm: &mut Swarm| {
+            let run = |swarm: &mut Swarm| {
                 let mut level = 0.0;
                 swarm.run(&mut Whole(|_: &[f64], _, values: &mut [f64]| {
                     level -= 1.0;
@@ -88,7 +88,8 @@ fn two_sections(c: &mut Criterion) {
             swarm.reseed(seed % 100);
             swarm.run(&mut Pointwise(|turns: &[f64]| distance(black_box(turns), 0.2, 0.06)))
         };
-        let hits = (0..100).filter(|_| run(&mut swarm).unwrap().status == Status::Converged).count();
+        let hits =
+            (0..100).filter(|_| run(&mut swarm).unwrap().status == Status::Converged).count();
         println!("two_sections/{name}: {hits} of 100 seeds to 1e-9 m");
         group.bench_function(name, |b| b.iter(|| run(&mut swarm)));
     }

@@ -15,12 +15,13 @@ tendon's length inside the robot: negative pulls.
 
 from __future__ import annotations
 
-from tdcr import constant_curvature
+from tdcr import constant_curvature, pso
 from tdcr._batch import ShapeBatch, forward_batch
 from tdcr._core import (
     Backbone,
     ConstantCurvatureSettings,
     LinkageSettings,
+    PsoSettings,
     Robot,
     Shape,
     Tendon,
@@ -37,6 +38,7 @@ __all__ = [
     "InvalidInput",
     "LinkageSettings",
     "NotConverged",
+    "PsoSettings",
     "Robot",
     "Shape",
     "ShapeBatch",
@@ -47,4 +49,5 @@ __all__ = [
     "forward",
     "forward_batch",
     "jacobian",
+    "pso",
 ]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence, Sized
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence, Sized
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from tdcr import _core
+from tdcr._progress import told
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -195,7 +195,8 @@ def forward_batch(
     """
     if isinstance(fields, str):
         fields = (fields,)
-    with _told(progress, displacements) as tell:
+    total = len(displacements) if isinstance(displacements, Sized) else None
+    with told(progress, "forward_batch", total) as tell:
         columns = _core._forward_batch(
             robot,
             displacements,
@@ -206,23 +207,3 @@ def forward_batch(
             progress=tell,
         )
     return ShapeBatch(robot, columns.pop("displacements"), model, settings, columns)
-
-
-@contextmanager
-def _told(
-    progress: bool | Callable[[int], object], displacements: ArrayLike
-) -> Iterator[Callable[[int], object] | None]:
-    """Give the callable that is told the rows done, or None."""
-    if callable(progress):
-        yield progress
-    elif progress:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
-
-        columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=Console(stderr=True)) as bar:
-            total = len(displacements) if isinstance(displacements, Sized) else None
-            task = bar.add_task("forward_batch", total=total)
-            yield lambda done: bar.update(task, completed=done)
-    else:
-        yield None

@@ -11,6 +11,7 @@ __all__ = [
     "Backbone",
     "ConstantCurvatureSettings",
     "LinkageSettings",
+    "PsoSettings",
     "Robot",
     "Shape",
     "Tendon",
@@ -21,6 +22,7 @@ __all__ = [
     "_displacements_from_arc",
     "_fields",
     "_forward_batch",
+    "_pso_minimize",
     "_rotation_vector",
     "_rust_defaults",
     "_shape",
@@ -199,6 +201,69 @@ class ConstantCurvatureSettings:
     def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
 
 @final
+class PsoSettings:
+    def __new__(
+        cls,
+        *,
+        sampling: str = "box",
+        inertia: float = 0.7298437881283576,
+        cognitive: float = 1.496179765663133,
+        social: float = 1.496179765663133,
+        topology: str = "global",
+        neighbours: int = 1,
+        particles: int = 30,
+        bounds: str = "absorb",
+        velocity_limit: float | None = 0.5,
+        max_iterations: int = 1000,
+        max_evaluations: int | None = None,
+        target: float | None = None,
+        stagnation: int | None = 100,
+        improvement: float = 0.0,
+        seed: int = 0,
+    ) -> Self: ...
+    @staticmethod
+    def constriction(**changes: Any) -> PsoSettings: ...
+    @staticmethod
+    def spso2011(**changes: Any) -> PsoSettings: ...
+    @staticmethod
+    def mahfoudi(**changes: Any) -> PsoSettings: ...
+    def replace(self, **changes: Any) -> Self: ...
+    @property
+    def sampling(self) -> str: ...
+    @property
+    def inertia(self) -> float: ...
+    @property
+    def cognitive(self) -> float: ...
+    @property
+    def social(self) -> float: ...
+    @property
+    def topology(self) -> str: ...
+    @property
+    def neighbours(self) -> int: ...
+    @property
+    def particles(self) -> int: ...
+    @property
+    def bounds(self) -> str: ...
+    @property
+    def velocity_limit(self) -> float | None: ...
+    @property
+    def max_iterations(self) -> int: ...
+    @property
+    def max_evaluations(self) -> int | None: ...
+    @property
+    def target(self) -> float | None: ...
+    @property
+    def stagnation(self) -> int | None: ...
+    @property
+    def improvement(self) -> float: ...
+    @property
+    def seed(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
 class Shape:
     @property
     def robot(self) -> Robot: ...
@@ -298,6 +363,17 @@ def _arc_jacobian(
     base: ArrayLike | None,
     tool: ArrayLike | None,
 ) -> _Array: ...
+def _pso_minimize(
+    f: Callable[[_Array], object],
+    lower: ArrayLike,
+    upper: ArrayLike,
+    *,
+    settings: PsoSettings,
+    start: ArrayLike | None,
+    vectorized: bool,
+    callback: Callable[[int, float], object] | None,
+    progress: Callable[[int], object] | None,
+) -> tuple[_Array, float, Status, str, str, int, int, int, _Array]: ...
 def _rotation_vector(frame: ArrayLike) -> tuple[float, float, float]: ...
 def _rust_defaults() -> dict[str, dict[str, Any]]: ...
 def _tendon(

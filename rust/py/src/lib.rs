@@ -13,6 +13,8 @@ mod constant_curvature;
 mod convert;
 mod forward;
 mod long_call;
+mod pso;
+mod pso_settings;
 mod robot;
 mod settings;
 mod shape;
@@ -31,6 +33,10 @@ mod _core {
     };
     #[pymodule_export]
     use crate::forward::{_fields, _forward_batch, forward, jacobian};
+    #[pymodule_export]
+    use crate::pso::_pso_minimize;
+    #[pymodule_export]
+    use crate::pso_settings::PsoSettings;
     #[pymodule_export]
     use crate::robot::Robot;
     #[pymodule_export]

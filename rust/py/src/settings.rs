@@ -6,9 +6,11 @@ use pyo3::types::{PyDict, PyTuple};
 use tdcr::InvalidInput;
 use tdcr::constant_curvature as cc;
 use tdcr::linkage;
+use tdcr::solve::pso::PsoSettings;
 
 use crate::arguments::whole;
 use crate::convert::invalid;
+use crate::pso_settings;
 
 /// How precisely and how long the linkage model solves each subsegment.
 ///
@@ -158,5 +160,6 @@ pub(crate) fn _rust_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     values.set_item("coupling", curvature.coupling.as_str())?;
     values.set_item("extensible", curvature.extensible)?;
     defaults.set_item("ConstantCurvatureSettings", values)?;
+    defaults.set_item("PsoSettings", pso_settings::keywords(py, &PsoSettings::default())?)?;
     Ok(defaults)
 }

@@ -286,7 +286,7 @@ fn check_box(lower: &[f64], upper: &[f64]) -> Result<(), InvalidInput> {
         return Err(InvalidInput::new("upper", expected, upper.len()));
     }
     for (argument, bounds) in [("lower", lower), ("upper", upper)] {
-        let odd = bounds.iter().position(|b| !(b.abs() <= LARGEST_BOUND));
+        let odd = bounds.iter().position(|b| b.is_nan() || b.abs() > LARGEST_BOUND);
         if let Some(d) = odd {
             let got = format!("{:?} in coordinate {d}", bounds[d]);
             return Err(InvalidInput::new(argument, "finite numbers, at most 1e300", got));

@@ -1,0 +1,37 @@
+"""Who is told how far a long call has come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+__all__ = ["told"]
+
+
+@contextmanager
+def told(
+    progress: bool | Callable[[int], object], name: str, total: int | None
+) -> Iterator[Callable[[int], object] | None]:
+    """Give the callable that is told what is done, or None.
+
+    Parameters
+    ----------
+    progress : bool or callable
+        True draws a progress bar on stderr; a callable is given back.
+    name : str
+        What the bar is for.
+    total : int or None
+        How much there is to do, if that is known.
+    """
+    if callable(progress):
+        yield progress
+    elif progress:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+        columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=Console(stderr=True)) as bar:
+            task = bar.add_task(name, total=total)
+            yield lambda done: bar.update(task, completed=done)
+    else:
+        yield None
