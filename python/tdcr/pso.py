@@ -44,8 +44,8 @@ class PsoResult:
     value: float
     """Its value; infinity if no value below that was seen."""
     status: Status
-    """converged: the target was reached, or, without a target, the run stagnated. iteration_limit: it
-    ended above its target, or by a budget or the callback. numerical_error: no evaluation gave a
+    """converged: the target was reached, or, without a target, the run stagnated. iteration_limit:
+    it ended above its target, or by a budget or the callback. numerical_error: no evaluation gave a
     value below infinity."""
     stop: str
     """What ended the run: "target", "stagnation", "iterations", "evaluations" or "callback"."""
@@ -134,8 +134,8 @@ def minimize(
     vectorized : bool, optional
         Whether `f` takes the whole swarm at once.
     callback : callable, optional
-        Gets the number of moves so far and the best value, after the start and after every move. The
-        run ends when it returns True.
+        Gets the number of moves so far and the best value, after the start and after every move.
+        The run ends when it returns True.
     progress : bool or callable, optional
         True draws a progress bar on a terminal; a callable gets the number of moves so far about
         every 50 ms.

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyFloat, PyTuple};
 
 use tdcr::solve::pso::{Objective, Progress, Swarm};
 
@@ -29,6 +29,9 @@ impl Function<'_, '_> {
         let py = self.f.py();
         // A new array every time: the function may keep it.
         let value = self.f.call1((PyArray1::from_slice(py, point),))?;
+        if let Ok(value) = value.cast::<PyFloat>() {
+            return Ok(value.value());
+        }
         if let Ok(array) = value.cast::<PyUntypedArray>()
             && array.ndim() != 0
         {
@@ -68,7 +71,10 @@ impl Objective for Function<'_, '_> {
     }
 
     fn watch(&mut self, progress: &Progress) -> PyResult<bool> {
-        self.f.py().check_signals()?;
+        let py = self.f.py();
+        // Functions written in C let no other thread run either.
+        py.detach(|| ());
+        py.check_signals()?;
         if let Some(tell) = self.progress
             && self.told.elapsed() >= POLL
         {
