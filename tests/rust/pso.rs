@@ -184,6 +184,26 @@ fn minima_are_found_at_the_stated_rates() {
     }
 }
 
+/// Rosenbrock's valley in five dimensions takes thousands of moves, and a draw that can follow it.
+#[test]
+fn curved_valleys_are_slow() {
+    let hits = |settings: PsoSettings| {
+        let settings =
+            PsoSettings { particles: 40, max_iterations: 5000, target: Some(1e-8), ..settings };
+        let mut swarm = swarm(settings, 5.0, 5);
+        let runs = (0..20).map(|seed| {
+            swarm.reseed(seed);
+            swarm.run(&mut Pointwise(rosenbrock)).unwrap()
+        });
+        let hits: Vec<_> = runs.filter(|report| report.status == Status::Converged).collect();
+        assert!(hits.iter().all(|report| report.iterations > 1000));
+        hits.len()
+    };
+    let (ball, boxes) = (hits(PsoSettings::spso2011()), hits(PsoSettings::constriction()));
+    println!("rosenbrock 5, 5000 moves of 40: ball {ball} of 20, box {boxes} of 20");
+    assert!(ball >= 18 && boxes <= 5);
+}
+
 /// The ball prefers no axes, the box does: a long narrow valley along an axis, and turned by 30 degrees
 /// in every plane of two neighbouring coordinates. The start, uniform in a cube, does prefer axes, so
 /// this compares means over many seeds.
