@@ -1,4 +1,4 @@
-//! The particle swarm: published constants, reproducibility, bounds, stops, rates of success.
+//! The particle swarm: published constants, reproducibility, bounds, stops, bad values.
 
 use std::f64::consts::{LN_2, TAU};
 
@@ -9,20 +9,20 @@ use tdcr::solve::pso::{
     SPSO_ACCELERATION, SPSO_INERTIA, Sampling, Stop, Swarm, Topology, Watched, Whole,
 };
 
-fn sphere(x: &[f64]) -> f64 {
+pub(crate) fn sphere(x: &[f64]) -> f64 {
     x.iter().map(|x| (x - 1.0).powi(2)).sum()
 }
 
-fn rosenbrock(x: &[f64]) -> f64 {
+pub(crate) fn rosenbrock(x: &[f64]) -> f64 {
     x.windows(2).map(|w| 100.0 * (w[1] - w[0] * w[0]).powi(2) + (1.0 - w[0]).powi(2)).sum()
 }
 
-fn rastrigin(x: &[f64]) -> f64 {
+pub(crate) fn rastrigin(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x - 10.0 * (TAU * x).cos() + 10.0).sum()
 }
 
 /// Every preset, with every topology where it has a choice.
-fn kinds() -> Vec<(&'static str, PsoSettings)> {
+pub(crate) fn kinds() -> Vec<(&'static str, PsoSettings)> {
     let constriction = PsoSettings::constriction();
     vec![
         ("constriction", constriction),
@@ -33,7 +33,7 @@ fn kinds() -> Vec<(&'static str, PsoSettings)> {
     ]
 }
 
-fn swarm(settings: PsoSettings, half: f64, n: usize) -> Swarm {
+pub(crate) fn swarm(settings: PsoSettings, half: f64, n: usize) -> Swarm {
     Swarm::new(settings, &vec![-half; n], &vec![half; n]).unwrap()
 }
 
@@ -100,7 +100,7 @@ fn the_run_depends_on_the_seed_alone() {
 #[test]
 fn no_point_leaves_the_box() {
     // Dimensions of very different width, one without any.
-    let (lower, upper) = ([-1.0, 3.0, -1e-9, 2.0, -1e300], [1.0, 1e6, 1e-9, 2.0, 1e300]);
+    let (lower, upper) = ([-1.0, 3.0, -1e-9, 2.0, -1e150], [1.0, 1e6, 1e-9, 2.0, 1e150]);
     for (name, kind) in kinds() {
         for bounds in Bounds::ALL {
             for (velocity_limit, inertia) in
@@ -122,7 +122,7 @@ fn no_point_leaves_the_box() {
                         assert!((lower[d]..=upper[d]).contains(&x[d]), "{name} {bounds:?} {x:?}");
                         on_bounds += usize::from(d != 3 && x[d] == lower[d]);
                     }
-                    x[0] + 1e-6 * x[1] + 1e9 * x[2] + 1e-300 * x[4]
+                    x[0] + 1e-6 * x[1] + 1e9 * x[2] + 1e-150 * x[4]
                 });
                 swarm.run(&mut objective).unwrap();
                 assert!(on_bounds > 0 || bounds == Bounds::Reflect, "{name} {bounds:?}");
@@ -152,92 +152,6 @@ fn velocities_are_limited() {
         });
         swarm.run(&mut objective).unwrap();
     }
-}
-
-/// Runs of many seeds that reach 1e-8, with the rates stated in docs/pso.md.
-#[test]
-fn minima_are_found_at_the_stated_rates() {
-    type Case = (&'static str, fn(&[f64]) -> f64, f64, usize, [usize; 5]);
-    let cases: [Case; 5] = [
-        // Of 200 seeds: constriction global and ring, SPSO-2011 with random links and ring, Mahfoudi.
-        ("sphere", sphere, 5.0, 2, [200, 200, 200, 200, 200]),
-        ("sphere", sphere, 5.0, 10, [200, 200, 200, 200, 200]),
-        ("rosenbrock", rosenbrock, 5.0, 2, [200, 198, 200, 200, 196]),
-        ("rastrigin", rastrigin, 5.12, 2, [196, 196, 196, 196, 190]),
-        ("rastrigin", rastrigin, 5.12, 3, [185, 190, 185, 50, 165]),
-    ];
-    for (name, function, half, n, least) in cases {
-        for ((kind, settings), least) in kinds().into_iter().zip(least) {
-            let mut swarm = swarm(PsoSettings { target: Some(1e-8), ..settings }, half, n);
-            let (mut hits, mut evaluations) = (0, 0);
-            for seed in 0..200 {
-                swarm.reseed(seed);
-                let report = swarm.run(&mut Pointwise(function)).unwrap();
-                hits += usize::from(report.status == Status::Converged);
-                evaluations += report.evaluations;
-                assert_eq!(report.value, function(swarm.best()));
-                assert_eq!(report.status == Status::Converged, report.value <= 1e-8);
-            }
-            println!("{name} {n}, {kind}: {hits} of 200, {} evaluations", evaluations / 200);
-            assert!(hits >= least, "{name} {n} {kind}: {hits} of 200");
-        }
-    }
-}
-
-/// Rosenbrock's valley in five dimensions takes thousands of moves, and a draw that can follow it.
-#[test]
-fn curved_valleys_are_slow() {
-    let hits = |settings: PsoSettings| {
-        let settings =
-            PsoSettings { particles: 40, max_iterations: 5000, target: Some(1e-8), ..settings };
-        let mut swarm = swarm(settings, 5.0, 5);
-        let runs = (0..20).map(|seed| {
-            swarm.reseed(seed);
-            swarm.run(&mut Pointwise(rosenbrock)).unwrap()
-        });
-        let hits: Vec<_> = runs.filter(|report| report.status == Status::Converged).collect();
-        assert!(hits.iter().all(|report| report.iterations > 1000));
-        hits.len()
-    };
-    let (ball, boxes) = (hits(PsoSettings::spso2011()), hits(PsoSettings::constriction()));
-    println!("rosenbrock 5, 5000 moves of 40: ball {ball} of 20, box {boxes} of 20");
-    assert!(ball >= 18 && boxes <= 5);
-}
-
-/// The ball prefers no axes, the box does: a long narrow valley along an axis, and turned by 30 degrees
-/// in every plane of two neighbouring coordinates. The start, uniform in a cube, does prefer axes, so
-/// this compares means over many seeds.
-#[test]
-fn the_ball_does_not_care_for_rotations() {
-    let n = 6;
-    let (sine, cosine) = (TAU / 12.0).sin_cos();
-    let valley = |x: &[f64]| -> f64 { x.iter().rev().fold(0.0, |sum, x| 10.0 * sum + x * x) };
-    let turned = |x: &[f64]| {
-        let mut y = [0.0; 6];
-        y.copy_from_slice(x);
-        for d in 0..n - 1 {
-            (y[d], y[d + 1]) = (cosine * y[d] - sine * y[d + 1], sine * y[d] + cosine * y[d + 1]);
-        }
-        valley(&y)
-    };
-    let mean_digits = |settings: PsoSettings, function: &dyn Fn(&[f64]) -> f64| {
-        let mut swarm = swarm(
-            PsoSettings { max_iterations: 200, stagnation: None, velocity_limit: None, ..settings },
-            1.0,
-            n,
-        );
-        let digits = (0..200).map(|seed| {
-            swarm.reseed(seed);
-            swarm.run(&mut Pointwise(function)).unwrap().value.log10()
-        });
-        digits.sum::<f64>() / 200.0
-    };
-    let difference = |settings| mean_digits(settings, &turned) - mean_digits(settings, &valley);
-    let ball = difference(PsoSettings { topology: Topology::Ring, ..PsoSettings::spso2011() });
-    let boxes = difference(PsoSettings { particles: 40, ..kinds()[1].1 });
-    println!("digits lost by turning the valley: ball {ball:.2}, box {boxes:.2}");
-    assert!(ball.abs() < 0.3, "{ball}");
-    assert!(boxes > 1.0, "{boxes}");
 }
 
 #[test]
@@ -339,6 +253,29 @@ fn nan_is_counted_and_never_best() {
     }
 }
 
+/// As long as there is no value, particles only coast: nothing draws them back to where they were.
+#[test]
+fn without_a_value_nothing_pulls() {
+    for (name, kind) in kinds() {
+        let settings = PsoSettings { max_iterations: 4, bounds: Bounds::Clamp, ..kind };
+        let mut seen: Vec<Vec<f64>> = Vec::new();
+        let mut nowhere = Whole(|points: &[f64], _, _: &mut [f64]| seen.push(points.to_vec()));
+        swarm(settings, 5.0, 2).run(&mut nowhere).unwrap();
+        let mut coasting = 0;
+        for e in 0..seen[0].len() {
+            // Those that meet a wall stop there.
+            if seen.iter().all(|places| places[e].abs() < 5.0) {
+                coasting += 1;
+                for w in seen.windows(3) {
+                    let (before, after) = (w[1][e] - w[0][e], w[2][e] - w[1][e]);
+                    assert!((after - kind.inertia * before).abs() < 1e-14, "{name}");
+                }
+            }
+        }
+        assert!(coasting > 5, "{name}");
+    }
+}
+
 /// An objective that forgets a value has not found one.
 #[test]
 fn values_left_out_are_nan() {
@@ -431,7 +368,7 @@ fn bad_input_names_the_argument() {
     assert_eq!(of(&[], &[]), "lower");
     assert_eq!(of(&[f64::NAN, 0.0], &[1.0, 1.0]), "lower");
     assert_eq!(of(&[-f64::INFINITY], &[1.0]), "lower");
-    assert_eq!(of(&[0.0], &[1e301]), "upper");
+    assert_eq!(of(&[0.0], &[1e151]), "upper");
     assert_eq!(of(&[0.0, 0.0], &[1.0]), "upper");
     let error = Swarm::new(base, &[0.0, 3.0], &[1.0, 2.0]).unwrap_err();
     assert_eq!(error.to_string(), "upper: expected at least lower, 3.0 in coordinate 1, got 2.0");
@@ -439,6 +376,13 @@ fn bad_input_names_the_argument() {
     let huge = PsoSettings { particles: 1_000_000, ..base };
     let (lower, upper) = (vec![0.0; 4_000_000], vec![1.0; 4_000_000]);
     assert_eq!(Swarm::new(huge, &lower, &upper).unwrap_err().argument, "particles");
+    let informed = PsoSettings {
+        particles: 1_000_000,
+        neighbours: 1_000_000,
+        topology: Topology::Random,
+        ..base
+    };
+    assert_eq!(Swarm::new(informed, &[0.0], &[1.0]).unwrap_err().argument, "particles");
     // A refused reset leaves the swarm as it was.
     let mut swarm = swarm(base, 5.0, 2);
     let before = swarm.run(&mut Pointwise(sphere)).unwrap();

@@ -13,6 +13,14 @@ pub(super) struct Leaders {
     lots: Lots,
 }
 
+/// How many links a swarm draws.
+pub(super) fn links(settings: &PsoSettings) -> usize {
+    match settings.topology {
+        Topology::Random => settings.neighbours.saturating_mul(settings.particles),
+        Topology::Global | Topology::Ring => 0,
+    }
+}
+
 impl Default for Leaders {
     fn default() -> Self {
         Self { of: Vec::new(), informed: Vec::new(), lots: Lots::new(0) }
@@ -23,11 +31,7 @@ impl Leaders {
     /// Sizes the buffers.
     pub(super) fn resize(&mut self, settings: &PsoSettings) {
         self.of.resize(settings.particles, 0);
-        let links = match settings.topology {
-            Topology::Random => settings.neighbours.saturating_mul(settings.particles),
-            Topology::Global | Topology::Ring => 0,
-        };
-        self.informed.resize(links, 0);
+        self.informed.resize(links(settings), 0);
     }
 
     /// Starts the stream of the random links.

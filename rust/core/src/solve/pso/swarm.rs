@@ -45,16 +45,16 @@ struct Run {
     iterations: usize,
     evaluations: usize,
     nan_count: usize,
-    /// Whether the last iteration lowered any particle's best value, and the best of all.
-    any_better: bool,
+    /// Whether the last iteration changed any particle's best point, and lowered the best of all.
+    learned: bool,
     better: bool,
     /// The best value at the last progress, and the iterations since.
     milestone: f64,
     idle: usize,
 }
 
-/// Bounds are of a size whose widths, mirrored places and velocities are numbers.
-const LARGEST_BOUND: f64 = 1e300;
+/// Bounds are of a size that leaves widths, mirrored places and squares of distances finite.
+const LARGEST_BOUND: f64 = 1e150;
 
 impl Swarm {
     /// A swarm of settings in the box from `lower` to `upper`, one number per dimension. Equal bounds
@@ -62,7 +62,7 @@ impl Swarm {
     ///
     /// # Errors
     /// `InvalidInput` for settings out of range; no dimension; bounds of different number, that are
-    /// not finite or larger than 1e300, or whose lower is above the upper; a swarm that does not fit
+    /// not finite or larger than 1e150, or whose lower is above the upper; a swarm that does not fit
     /// into memory.
     pub fn new(settings: PsoSettings, lower: &[f64], upper: &[f64]) -> Result<Self, InvalidInput> {
         let mut swarm = Self {
@@ -197,20 +197,21 @@ impl Swarm {
         objective.values(&self.cloud.places, self.dimensions, &mut self.values)?;
         let run = &mut self.run;
         run.evaluations += self.values.len();
-        (run.any_better, run.better) = (false, false);
+        (run.learned, run.better) = (false, false);
         let before = self.own[run.best];
         for (particle, &value) in self.values.iter().enumerate() {
             run.nan_count += usize::from(value.is_nan());
             if value < self.own[particle] {
                 self.own[particle] = value;
                 self.cloud.remember(particle);
-                run.any_better = true;
+                run.learned = true;
                 if value < self.own[run.best] {
                     run.best = particle;
                 }
             } else if self.own[particle] == f64::INFINITY {
                 // Nothing to remember yet: not to be drawn back to where it started.
                 self.cloud.remember(particle);
+                run.learned = true;
             }
         }
         let value = self.own[run.best];
@@ -256,7 +257,7 @@ impl Swarm {
         let run = &self.run;
         let first = run.iterations == 0;
         let random = self.leaders.is_random();
-        if first || run.any_better || (random && !run.better) {
+        if first || run.learned || (random && !run.better) {
             self.leaders.choose(&self.settings, &self.own, run.best, run.better && !first);
             self.cloud.follow(&self.leaders.of);
         }
@@ -289,7 +290,7 @@ fn check_box(lower: &[f64], upper: &[f64]) -> Result<(), InvalidInput> {
         let odd = bounds.iter().position(|b| b.is_nan() || b.abs() > LARGEST_BOUND);
         if let Some(d) = odd {
             let got = format!("{:?} in coordinate {d}", bounds[d]);
-            return Err(InvalidInput::new(argument, "finite numbers, at most 1e300", got));
+            return Err(InvalidInput::new(argument, "finite numbers, at most 1e150", got));
         }
     }
     if let Some(d) = (0..lower.len()).find(|&d| lower[d] > upper[d]) {
@@ -303,8 +304,12 @@ fn check_box(lower: &[f64], upper: &[f64]) -> Result<(), InvalidInput> {
 fn fits(settings: &PsoSettings, dimensions: usize) -> Result<(), InvalidInput> {
     // Nine numbers per coordinate and at least one draw, which come in blocks of 32.
     let size = settings.particles.saturating_mul(dimensions.max(32)).saturating_mul(10);
-    let links = settings.particles.saturating_mul(settings.neighbours.min(settings.particles));
-    Vec::<u64>::new().try_reserve_exact(size.saturating_add(links)).map_err(|_| {
+    let size = size.saturating_add(super::leaders::links(settings));
+    // What any machine has is not asked for: a reset of a small swarm allocates nothing.
+    if size <= 1 << 20 {
+        return Ok(());
+    }
+    Vec::<u64>::new().try_reserve_exact(size).map_err(|_| {
         let got = format!("{} in {dimensions} dimensions", settings.particles);
         InvalidInput::new("particles", "a swarm that fits into memory", got)
     })
