@@ -15,7 +15,7 @@ tendon's length inside the robot: negative pulls.
 
 from __future__ import annotations
 
-from tdcr import constant_curvature
+from tdcr import constant_curvature, pso
 from tdcr._batch import ShapeBatch, forward_batch
 from tdcr._core import (
     Backbone,
@@ -23,6 +23,7 @@ from tdcr._core import (
     ConstantCurvatureSettings,
     InverseSettings,
     LinkageSettings,
+    PsoSettings,
     Robot,
     Shape,
     Tendon,
@@ -53,6 +54,7 @@ __all__ = [
     "LinkageSettings",
     "Manipulability",
     "NotConverged",
+    "PsoSettings",
     "Robot",
     "Shape",
     "ShapeBatch",
@@ -67,5 +69,6 @@ __all__ = [
     "inverse_solutions",
     "jacobian",
     "manipulability",
+    "pso",
     "track",
 ]

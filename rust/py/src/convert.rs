@@ -59,7 +59,10 @@ impl Lazy {
 
 /// The name of a value's type, for messages.
 pub(crate) fn type_name(value: &Bound<'_, PyAny>) -> String {
-    value.get_type().name().map_or_else(|_| "another type".to_owned(), |name| name.to_string())
+    // Not by str(), which looks at signals and would lose a Ctrl-C on the way.
+    let name = value.get_type().name();
+    let name = name.and_then(|name| name.to_cow().map(std::borrow::Cow::into_owned));
+    name.unwrap_or_else(|_| "another type".to_owned())
 }
 
 /// An array of numbers of any shape as C-order float64.

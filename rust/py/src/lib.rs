@@ -15,6 +15,8 @@ mod convert;
 mod forward;
 mod inverse;
 mod long_call;
+mod pso;
+mod pso_settings;
 mod robot;
 mod settings;
 mod shape;
@@ -37,6 +39,10 @@ mod _core {
     use crate::forward::{_fields, _forward_batch, forward, jacobian};
     #[pymodule_export]
     use crate::inverse::{_inverse, _inverse_batch, _inverse_solutions};
+    #[pymodule_export]
+    use crate::pso::_pso_minimize;
+    #[pymodule_export]
+    use crate::pso_settings::PsoSettings;
     #[pymodule_export]
     use crate::robot::Robot;
     #[pymodule_export]

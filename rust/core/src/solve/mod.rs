@@ -3,6 +3,7 @@
 pub mod fit;
 mod least;
 pub mod least_squares;
+pub mod pso;
 pub mod quadratic;
 pub mod region;
 pub mod sqp;
