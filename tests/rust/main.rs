@@ -15,6 +15,7 @@ mod linkage_bars;
 mod linkage_chain;
 mod linkage_drive;
 mod linkage_random;
+mod planar_two_section;
 mod robot;
 
 /// Every file beside this one is a module of this target: a forgotten one would never run.

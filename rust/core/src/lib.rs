@@ -32,6 +32,7 @@ pub mod error;
 pub mod lie;
 pub mod linkage;
 pub mod model;
+pub mod planar;
 pub mod robot;
 mod shape;
 pub mod solve;
