@@ -15,6 +15,8 @@ mod linkage_bars;
 mod linkage_chain;
 mod linkage_drive;
 mod linkage_random;
+mod planar_inverse;
+mod planar_trunk;
 mod planar_two_section;
 mod robot;
 

@@ -128,3 +128,173 @@ fn a_million_random_targets() {
         sums.reduce(|| (0, 0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1, a.2.max(b.2)));
     println!("{count} solutions, {folds} at folds, largest miss {worst:.1e} of the length");
 }
+
+/// Targets at, just inside and just outside of folds, where two solutions meet.
+#[test]
+fn folds_keep_both_solutions_or_the_double_one() {
+    let mut u = uniform(42);
+    let (mut doubles, mut pairs) = (0, 0);
+    for case in 0..4000 {
+        let (l1, l2) = (1.0, 5f64.powf(u(-1.0, 1.0)));
+        let two = TwoSections::new(l1, l2, TAU).unwrap();
+        // A fold: bisection of the determinant along a random line of turns.
+        let (a, b) = ([u(-6.0, 6.0), u(-6.0, 6.0)], [u(-6.0, 6.0), u(-6.0, 6.0)]);
+        let at = |s: f64| [a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])];
+        let (mut low, mut high) = (0.0, 1.0);
+        if (fold(&two, at(low)) < 0.0) == (fold(&two, at(high)) < 0.0) {
+            continue;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            let same = (fold(&two, at(middle)) < 0.0) == (fold(&two, at(low)) < 0.0);
+            *(if same { &mut low } else { &mut high }) = middle;
+        }
+        let turns = at(low);
+        let target = two.tip(turns);
+        // Across the fold: normal to both derivatives.
+        let along = (two.tip([turns[0] + 1e-5, turns[1]]) - target).normalize();
+        let across = Vector2::new(-along.y, along.x);
+        let off = [0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-5][case % 7] * (l1 + l2);
+        for sign in [1.0, -1.0] {
+            let aim = target + across * (sign * off);
+            let found = all(&two, aim.x, aim.y);
+            for f in &found {
+                assert!((two.tip(*f) - aim).norm() < 1e-12 * (l1 + l2));
+            }
+            // Solutions near the fold: sqrt of the distance away.
+            let reach = 20.0 * (off / (l1 + l2)).sqrt() + 1e-5;
+            let close = found.iter().filter(|f| near(**f, turns, reach)).count();
+            if off < 2e-14 * (l1 + l2) {
+                assert!(close >= 1, "{l2} {turns:?} {off:e} {found:?}");
+                doubles += 1;
+            } else {
+                pairs += close;
+            }
+        }
+    }
+    println!("{doubles} double roots, {pairs} solutions near folds");
+    assert!(doubles > 1000 && pairs > 2000);
+}
+
+/// Targets that the first section reaches: the second is a closed circle to either side.
+#[test]
+fn closed_circles_are_solutions() {
+    let mut u = uniform(43);
+    for _ in 0..2000 {
+        let (l1, l2, turn) = (0.1, u(0.02, 0.5), u(-6.2, 6.2));
+        let two = TwoSections::new(l1, l2, TAU).unwrap();
+        let target = two.tip([turn, TAU]);
+        let found = all(&two, target.x, target.y);
+        for side in [TAU, -TAU] {
+            assert!(found.iter().any(|f| near(*f, [turn, side], 1e-9)), "{turn} {found:?}");
+        }
+        let found = all(&TwoSections::new(l1, l2, 6.28).unwrap(), target.x, target.y);
+        assert!(found.iter().all(|f| f[1].abs() <= 6.28));
+    }
+    // The base itself: one circle of both sections, and each section a circle of its own.
+    for l2 in [0.1, 0.03, 0.5] {
+        let two = TwoSections::new(0.1, l2, TAU).unwrap();
+        let found = all(&two, 0.0, 0.0);
+        assert_eq!(found.len(), 6, "{found:?}");
+        let whole = [TAU * 0.1 / (0.1 + l2), TAU * l2 / (0.1 + l2)];
+        assert!(near(found[0].map(f64::abs), whole, 1e-12), "{found:?}");
+        assert!(found[2..].iter().all(|f| f.map(f64::abs) == [TAU, TAU]));
+    }
+}
+
+/// No solution beyond the reach, and the mirrored ones for the mirrored target.
+#[test]
+fn reach_and_mirror() {
+    let two = TwoSections::new(0.140, 0.120, TAU).unwrap();
+    assert!(all(&two, 0.26 + 1e-12, 0.0).is_empty());
+    assert!(all(&two, 1.0, -3.0).is_empty());
+    assert!(all(&two, f64::NAN, 0.0).is_empty());
+    let mut u = uniform(44);
+    for _ in 0..2000 {
+        let (x, y) = (u(-0.26, 0.26), u(-0.26, 0.26));
+        let (up, down) = (all(&two, x, y), all(&two, x, -y));
+        assert_eq!(up.len(), down.len());
+        for f in &up {
+            assert!(down.iter().any(|g| near(*f, [-g[0], -g[1]], 1e-9)), "{x} {y} {f:?}");
+        }
+    }
+}
+
+/// A dense scan of the tip on a grid of both turns finds nothing that the solver has not: every cell
+/// whose corners say that it may hold the target is searched by Newton's method from its middle.
+#[test]
+fn a_dense_scan_finds_no_more() {
+    let n = 500;
+    let width = 2.0 * TAU / n as f64;
+    let total: usize = (0..40_u64)
+        .into_par_iter()
+        .map(|case| {
+            let mut u = uniform(4500 + case);
+            let (l1, l2) = (1.0, 4f64.powf(u(-1.0, 1.0)));
+            let two = TwoSections::new(l1, l2, TAU).unwrap();
+            let aim = tip(l1, l2, [u(-TAU, TAU), u(-TAU, TAU)]);
+            let found = all(&two, aim.x, aim.y);
+            let mut seen: Vec<[f64; 2]> = Vec::new();
+            for i in 0..n {
+                for k in 0..n {
+                    let middle = [i, k].map(|i| (i as f64 + 0.5) * width - TAU);
+                    // |d tip/d turn1| <= l1/2 + l2, |d tip/d turn2| <= l2/2.
+                    let reach = 0.5 * width * (0.5 * l1 + 1.5 * l2);
+                    if (two.tip(middle) - aim).norm() > reach {
+                        continue;
+                    }
+                    if let Some(root) = newton(&two, middle, aim)
+                        && root.iter().all(|t| t.abs() <= TAU)
+                        && !seen.iter().any(|s| near(*s, root, 1e-7))
+                    {
+                        seen.push(root);
+                    }
+                }
+            }
+            for root in &seen {
+                assert!(
+                    found.iter().any(|f| near(*f, *root, 1e-6)),
+                    "{l2} {aim} {root:?} {found:?}"
+                );
+            }
+            assert!(found.len() >= seen.len());
+            seen.len()
+        })
+        .sum();
+    println!("{total} solutions by the scan");
+    assert!(total > 80);
+}
+
+/// Newton's method with differences, to a miss below 1e-11.
+fn newton(two: &TwoSections, start: [f64; 2], aim: Vector2<f64>) -> Option<[f64; 2]> {
+    let mut turns = start;
+    for _ in 0..30 {
+        let off = two.tip(turns) - aim;
+        if off.norm() < 1e-11 {
+            return Some(turns);
+        }
+        let h = 1e-6;
+        let by = |i: usize| {
+            let mut moved = turns;
+            moved[i] += h;
+            (two.tip(moved) - two.tip(turns)) / h
+        };
+        let (a, b) = (by(0), by(1));
+        let area = a.perp(&b);
+        turns = [turns[0] - off.perp(&b) / area, turns[1] - a.perp(&off) / area];
+        if !turns.iter().all(|t| t.abs() < 10.0) {
+            return None;
+        }
+    }
+    None
+}
+
+#[test]
+fn bad_sections_name_the_argument() {
+    let name = |l1, l2, limit| TwoSections::new(l1, l2, limit).unwrap_err().argument;
+    assert_eq!(name(0.0, 1.0, 1.0), "l1");
+    assert_eq!(name(1.0, f64::NAN, 1.0), "l2");
+    assert_eq!(name(1.0, 1.0, 0.0), "limit");
+    assert_eq!(name(1.0, 1.0, 6.3), "limit");
+    assert_eq!(name(1.0, 1.0, f64::NAN), "limit");
+}

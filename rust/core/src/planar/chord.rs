@@ -68,7 +68,8 @@ pub(super) fn sinc(x: f64, sin: f64, cos: f64) -> (f64, f64) {
     if x.abs() < 0.1 {
         let s = x * x;
         let value = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)));
-        let slope = -x / 3.0 * (1.0 - s / 10.0 * (1.0 - s / 28.0 * (1.0 - s / 54.0 * (1.0 - s / 88.0))));
+        let slope =
+            -x / 3.0 * (1.0 - s / 10.0 * (1.0 - s / 28.0 * (1.0 - s / 54.0 * (1.0 - s / 88.0))));
         return (value, slope);
     }
     let value = sin / x;

@@ -38,6 +38,18 @@ impl TwoSections {
         Ok(Self { lengths: [l1, l2], limit })
     }
 
+    /// Lengths of the sections \[m\].
+    #[must_use]
+    pub fn lengths(&self) -> [f64; 2] {
+        self.lengths
+    }
+
+    /// Largest |turn| \[rad\].
+    #[must_use]
+    pub fn limit(&self) -> f64 {
+        self.limit
+    }
+
     /// All turns (turn1, turn2) \[rad\] with |turn| up to the limit that put the tip on (x, y) \[m\],
     /// by bending energy `turn1^2/(2 l1) + turn2^2/(2 l2)`, least first. What `found` held is
     /// dropped; its memory is reused.
@@ -53,7 +65,7 @@ impl TwoSections {
         let whole = self.lengths[0] + self.lengths[1];
         let tip = Tip { l1: self.lengths[0] / whole, l2: self.lengths[1] / whole };
         let target = Point::new(x / whole, y / whole);
-        if !(target.norm() <= 1.0 + EDGE) {
+        if target.norm().is_nan() || target.norm() > 1.0 + EDGE {
             return 0;
         }
         let mut search = Search { tip, target, found, looks: 0 };

@@ -47,7 +47,7 @@ impl Tip {
             let next = [turns[0] - step[0], turns[1] - step[1]];
             let (tip, first, second) = self.at(next);
             let (ahead, shorter) = (tip - target, (tip - target).norm_sqr());
-            if !(shorter < miss) {
+            if shorter.is_nan() || shorter >= miss {
                 break;
             }
             (turns, off, miss, by_first, by_second) = (next, ahead, shorter, first, second);

@@ -49,7 +49,7 @@ struct Equation {
 
 /// Value and derivatives of the equation on one sheet of the angle.
 #[derive(Clone, Copy)]
-struct Value {
+struct Level {
     value: f64,
     slope: f64,
     second: f64,
@@ -144,7 +144,7 @@ impl Search<'_> {
         }
         let equation = self.equation(node, to, distance);
         let bounds = Bounds::new(&equation, [l1, l2], [l1 * node.first_norm, second], least, half);
-        let (bend, sweep) = (|value: &Value| bounds.bend(value, half), bounds.sweep);
+        let (bend, sweep) = (|value: &Level| bounds.bend(value, half), bounds.sweep);
         if sweep > 1.5 {
             return false;
         }
@@ -166,7 +166,7 @@ impl Search<'_> {
         for ((angle, holds), value) in kinds.into_iter().zip(values) {
             let stretch = Stretch { middle: node.turn, half, angle, rate, sweep };
             match holds {
-                Holds::One => self.descend(stretch, &value),
+                Holds::One => self.descend(&stretch, &value),
                 Holds::Touch => self.tangent(&stretch),
                 Holds::None | Holds::Unknown => {}
             }
@@ -198,8 +198,8 @@ impl Search<'_> {
     }
 
     /// The one root of a monotone stretch, if it has one.
-    fn descend(&mut self, stretch: Stretch, value: &Value) {
-        let Stretch { middle, half, angle, rate, sweep } = stretch;
+    fn descend(&mut self, stretch: &Stretch, value: &Level) {
+        let &Stretch { middle, half, angle, rate, sweep } = stretch;
         let step = (-value.value / value.slope).clamp(-half, half);
         // The whole system from the step of the scalar equation: whatever it finds in the stretch is
         // the root.
@@ -215,7 +215,7 @@ impl Search<'_> {
     }
 
     /// The same by Newton's method between brackets.
-    fn bracket(&mut self, middle: f64, half: f64, reference: f64, value: &Value) {
+    fn bracket(&mut self, middle: f64, half: f64, reference: f64, value: &Level) {
         let (mut low, mut high) = (middle - half, middle + half);
         let mut turn = (middle - value.value / value.slope).clamp(low, high);
         for _ in 0..STEPS {
@@ -285,7 +285,7 @@ impl Search<'_> {
         for _ in 0..4 {
             let (equation, angle) = self.equation_at(turn, stretch.angle);
             let at = equation.value(self.tip.l2, angle);
-            if !(at.slope.abs() < at.second.abs() * 16.0 * stretch.half) {
+            if at.slope.abs() >= at.second.abs() * 16.0 * stretch.half {
                 return self.note([turn, 2.0 * angle]);
             }
             turn -= at.slope / at.second;
@@ -312,12 +312,12 @@ impl Search<'_> {
 
 impl Equation {
     /// Distance minus chord of the second section, turned by twice `angle`.
-    fn value(&self, l2: f64, angle: f64) -> Value {
+    fn value(&self, l2: f64, angle: f64) -> Level {
         let (value, slope) = sinc(angle, self.sin, self.cos);
         let (d, a) = (self.distance_rate, self.angle_rate);
         // sinc'' = -sinc - 2 sinc'/x.
         let curved = if angle.abs() < 1e-3 { -1.0 / 3.0 } else { -value - 2.0 * slope / angle };
-        Value {
+        Level {
             value: self.distance - l2 * value,
             slope: d[0] - l2 * slope * a[0],
             second: d[1] - l2 * (curved * a[0] * a[0] + slope * a[1]),
@@ -360,7 +360,7 @@ impl Bounds {
 
     /// A bound of the second derivative of the equation, over the interval and directly or from its
     /// value in the middle. The n-th derivative of sin(x)/x is at most 1/(n + 1).
-    fn bend(&self, at: &Value, half: f64) -> f64 {
+    fn bend(&self, at: &Level, half: f64) -> f64 {
         let [a1, a2, a3] = self.angle;
         let slope = (at.sinc_slope.abs() + self.sweep / 3.0).min(SINC_SLOPE);
         let direct = self.distance[0] + self.l2 * (a1 * a1 / 3.0 + slope * a2);
@@ -371,7 +371,7 @@ impl Bounds {
 
 /// What a bound on the second derivative says of an interval; values within `margin` of zero may be
 /// zero.
-fn judge(at: &Value, bend: f64, half: f64, margin: f64) -> Holds {
+fn judge(at: &Level, bend: f64, half: f64, margin: f64) -> Holds {
     let curved = 0.5 * bend * half * half;
     if at.value.abs() > at.slope.abs() * half + curved + margin {
         Holds::None
