@@ -15,7 +15,7 @@ tendon's length inside the robot: negative pulls.
 
 from __future__ import annotations
 
-from tdcr import constant_curvature
+from tdcr import constant_curvature, planar
 from tdcr._batch import ShapeBatch, forward_batch
 from tdcr._core import (
     Backbone,
@@ -47,4 +47,5 @@ __all__ = [
     "forward",
     "forward_batch",
     "jacobian",
+    "planar",
 ]

@@ -48,7 +48,7 @@ fn the_platforms_of_the_paper() {
         .map(|row| (row[0] * 1e3, (Vector2::new(row[1], row[2]) * 1e3 - printed).norm()))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .unwrap();
-    assert!((nearest.0 - 348.0).abs() < 0.15 && nearest.1 < 0.02, "{nearest:?}");
+    assert!((nearest.0 - 348.0).abs() < 0.15 && nearest.1 < 0.03, "{nearest:?}");
     assert!((at[1].0 * 1e3 - printed).norm() > 1.5);
 }
 
@@ -65,7 +65,7 @@ fn cables_and_turns_undo_each_other() {
         for (got, turn) in bent.turns.iter().zip(turns) {
             assert!((got - turn).abs() < 1e-12, "{got} {turn}");
         }
-        assert!(bent.misfit.iter().all(|m| m.abs() < 1e-15));
+        assert!(bent.misfit.iter().all(|m| m.abs() < 1e-13));
         // Cable 1 is on the left: a left turn shortens it, by the parallel arc or its chord.
         assert_eq!(turns[0] > 0.0, cables[0][0] < cables[0][1]);
     }
@@ -106,7 +106,7 @@ fn a_linear_angle_gives_the_arc() {
                     worst = worst.max((point - arc(turn * share) * *s).norm() / length);
                 }
                 assert!(worst < goal, "{turn} {intervals} {worst:e}");
-                assert!(worst * length <= curve.error + 1e-15 * length, "{worst:e}");
+                assert!(worst * length <= curve.error + 1e-14 * length, "{worst:e}");
                 if k == 8 && nodes == 2 {
                     println!("{intervals} intervals, turn pi: {worst:.1e} of the length");
                 }

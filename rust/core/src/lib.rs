@@ -5,7 +5,8 @@
 //!
 //! Rooms, from the bottom up: [`lie`] (rotations and rigid motions), [`solve`] (solvers that know no
 //! robots), [`robot`] (what a robot is), [`model`] (what every forward model offers), [`linkage`]
-//! (the linkage model), [`constant_curvature`], [`batch`] (many solves on all cores).
+//! (the linkage model), [`constant_curvature`], [`planar`] (planar
+//! trunks), [`batch`] (many solves on all cores).
 //!
 //! ```
 //! use tdcr::linkage::{Linkage, LinkageSettings, Plan};

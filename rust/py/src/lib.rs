@@ -13,6 +13,7 @@ mod constant_curvature;
 mod convert;
 mod forward;
 mod long_call;
+mod planar;
 mod robot;
 mod settings;
 mod shape;
@@ -31,6 +32,12 @@ mod _core {
     };
     #[pymodule_export]
     use crate::forward::{_fields, _forward_batch, forward, jacobian};
+    #[pymodule_export]
+    use crate::planar::{
+        _angle_at, _angle_coefficients, _angle_curve, _planar_cable_lengths, _planar_curve,
+        _planar_newton, _planar_newton_defaults, _planar_platforms, _planar_trunk, _planar_turns,
+        _two_section_batch, _two_section_nearest, _two_section_solutions,
+    };
     #[pymodule_export]
     use crate::robot::Robot;
     #[pymodule_export]

@@ -231,6 +231,7 @@ impl<'a> Solver<'a> {
     fn try_start(&mut self, start: &[f64]) {
         self.unwind(start);
         let mut turns = start.to_vec();
+        self.work.held.clear();
         if self.problem.reach(&mut turns, &mut self.work) * self.whole > self.settings.tolerance {
             return;
         }
@@ -259,15 +260,16 @@ impl<'a> Solver<'a> {
         for _ in 0..self.settings.max_iterations {
             problem.linearize(turns, work);
             let (multipliers, slope) = reduced(problem, turns, work);
-            if slope <= STATIONARY * (2.0 * energy).sqrt().max(1e-3) {
+            let free = work.free.iter().filter(|free| **free).count();
+            // With two free turns the target leaves no choice.
+            let fixed = free <= 2 + usize::from(problem.heading.is_some());
+            if fixed || slope <= STATIONARY * (2.0 * energy).sqrt().max(1e-3) {
                 return true;
             }
             self.iterations += 1;
             tangent_step(problem, turns, &multipliers, damping, work);
             trial.clone_from(turns);
-            for (turn, step) in trial.iter_mut().zip(&work.step) {
-                *turn += step.clamp(-2.0, 2.0);
-            }
+            to_the_limit(problem, &mut trial, work);
             let on = problem.reach(&mut trial, work) * self.whole <= self.settings.tolerance;
             let next = problem.energy(&trial);
             if on && next < energy {
@@ -315,6 +317,28 @@ impl<'a> Solver<'a> {
             iterations: self.iterations,
             starts,
         }
+    }
+}
+
+/// Takes the step, or the part of it up to the first limit on the way; holds the turns at limits.
+fn to_the_limit(problem: &Problem, turns: &mut [f64], work: &mut Work) {
+    let mut share = 1.0_f64;
+    let mut first = None;
+    for (i, (turn, step)) in turns.iter().zip(&work.step).enumerate() {
+        let room = problem.limits[i] - turn * step.signum();
+        share = share.min(2.0 / step.abs());
+        if work.free[i] && step.abs() * share > room {
+            (share, first) = ((room / step.abs()).max(0.0), Some(i));
+        }
+    }
+    work.held.clear();
+    work.held.extend(work.free.iter().map(|free| !free));
+    for (turn, step) in turns.iter_mut().zip(&work.step) {
+        *turn += share * step;
+    }
+    if let Some(i) = first {
+        turns[i] = problem.limits[i].copysign(work.step[i]);
+        work.held[i] = true;
     }
 }
 

@@ -26,6 +26,8 @@ pub(super) struct Work {
     /// Second derivative of the tip by a turn twice.
     pub(super) twice: Vec<Point>,
     pub(super) free: Vec<bool>,
+    /// Turns that [`Problem::reach`] leaves as they are.
+    pub(super) held: Vec<bool>,
     pub(super) trial: Vec<f64>,
     pub(super) step: Vec<f64>,
     pub(super) matrix: Vec<f64>,
@@ -110,8 +112,9 @@ impl Problem {
     /// matrix of the normal equations.
     fn least_change(&self, turns: &[f64], off: &Vector3<f64>, damping: f64, work: &mut Work) {
         let n = turns.len();
+        work.held.resize(n, false);
         work.free.clear();
-        work.free.resize(n, true);
+        work.free.extend(work.held.iter().map(|held| !held));
         work.step.resize(n, 0.0);
         for _ in 0..=n {
             let multipliers = self.gram(work, damping) * off;
