@@ -40,18 +40,7 @@ fn two_sections(c: &mut Criterion) {
                 two.solutions(black_box(x), black_box(y), &mut found);
             });
         });
-        if name == "paper" {
-            for threads in [1, 2] {
-                let pool = pool(Some(threads)).unwrap();
-                group.throughput(Throughput::Elements(targets.len() as u64));
-                group.bench_function(format!("two_sections/batch_of_1000/{threads}"), |b| {
-                    b.iter(|| solve_many(&two, &targets, &pool, &Control::default()));
-                });
-            }
-        }
     }
-    group.finish();
-    let mut group = c.benchmark_group("planar");
     let two = TwoSections::new(0.140, 0.120, TAU).unwrap();
     two.solutions(0.26, 0.0, &mut found);
     assert!(found.len() == 1 && found[0].iter().all(|turn| turn.abs() < 1e-9));
@@ -60,6 +49,30 @@ fn two_sections(c: &mut Criterion) {
     });
     assert!((two.nearest(0.3, 0.0).1 - 0.04).abs() < 1e-12);
     group.bench_function("nearest", |b| b.iter(|| two.nearest(black_box(0.3), 0.1)));
+    group.finish();
+}
+
+fn batch(c: &mut Criterion) {
+    let mut group = c.benchmark_group("planar/two_sections/batch_of_10000");
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let two = TwoSections::new(0.140, 0.120, TAU).unwrap();
+    let turns: Vec<[f64; 2]> =
+        (0..10_000).map(|_| [0; 2].map(|_| rng.random_range(-TAU..TAU))).collect();
+    let targets: Vec<[f64; 2]> = turns.iter().map(|turns| two.tip(*turns).into()).collect();
+    group.throughput(Throughput::Elements(targets.len() as u64));
+    for threads in [1, 2] {
+        let pool = pool(Some(threads)).unwrap();
+        let many = solve_many(&two, &targets, &pool, &Control::default()).unwrap();
+        let mut first = 0;
+        for (turns, count) in turns.iter().zip(many.counts) {
+            let own = &many.turns[first..first + count];
+            assert!(own.iter().any(|f| (f[0] - turns[0]).abs() < 1e-6));
+            first += count;
+        }
+        group.bench_function(format!("{threads}_threads"), |b| {
+            b.iter(|| solve_many(&two, &targets, &pool, &Control::default()));
+        });
+    }
     group.finish();
 }
 
@@ -83,5 +96,5 @@ fn rest(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(all, two_sections, rest);
+criterion_group!(all, two_sections, batch, rest);
 criterion_main!(all);

@@ -17,16 +17,24 @@ flexible continuum robot simulating elephant trunk" (2014); their theta is half 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import tau
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
 from tdcr import _core
+from tdcr._angle_function import AngleFunction, Curve, frozen
 from tdcr._status import Status
+from tdcr._two_section import (
+    Nearest,
+    TwoSectionBatch,
+    two_section_batch,
+    two_section_nearest,
+    two_section_solutions,
+)
 from tdcr.errors import InvalidInput, NotConverged
 
 if TYPE_CHECKING:
@@ -46,108 +54,6 @@ __all__ = [
     "two_section_nearest",
     "two_section_solutions",
 ]
-
-
-class Curve(NamedTuple):
-    """Points along a curve."""
-
-    s: Array
-    """Arc lengths, (k,) [m]."""
-    points: Array
-    """Points (x, y), (k, 2) [m]."""
-    headings: Array
-    """Angle of the tangent against x, (k,) [rad]."""
-    error: float
-    """Bound of the distance of any point from the exact curve, rounding apart [m]; 0 for arcs."""
-
-
-class Nearest(NamedTuple):
-    """The nearest point that two sections reach."""
-
-    turns: Array
-    """Turns of both sections, (2,) [rad]."""
-    distance: float
-    """From the tip to the target [m]."""
-
-
-class TwoSectionBatch(NamedTuple):
-    """Every solution of many targets, in one flat table."""
-
-    turns: Array
-    """Turns of all solutions, (T, 2) [rad]: target by target, each by bending energy."""
-    row: NDArray[np.intp]
-    """Number of the target that a solution belongs to, (T,)."""
-    counts: NDArray[np.uint64]
-    """Number of solutions of every target, (B,)."""
-
-
-class AngleFunction:
-    """A natural cubic spline through nodal angles, and the curve it makes (eqs. 10 and 11).
-
-    Parameters
-    ----------
-    s : array_like, shape (n + 1,)
-        Arc lengths of the nodes, rising [m].
-    angles : array_like, shape (n + 1,)
-        Angle of the tangent at the nodes [rad].
-
-    Attributes
-    ----------
-    s, angles : ndarray, shape (n + 1,)
-    coefficients : ndarray, shape (n, 4)
-        (a, b, c, d) of ``a u**3 + b u**2 + c u + d`` with u from 0 to 1 on every piece [rad].
-
-    Raises
-    ------
-    InvalidInput
-        Fewer than two nodes, arc lengths that do not rise, another number of angles, NaN.
-    """
-
-    __slots__ = ("angles", "coefficients", "s")
-
-    s: Array
-    angles: Array
-    coefficients: Array
-
-    def __init__(self, s: ArrayLike, angles: ArrayLike) -> None:
-        self.coefficients = _core._angle_coefficients(s, angles)
-        self.s = _frozen(s)
-        self.angles = _frozen(angles)
-
-    def __call__(self, s: ArrayLike) -> Any:
-        """Angle at arc lengths s [rad]: a float for a float, else an array of the same shape."""
-        at = np.asarray(s, dtype=np.float64)
-        values = _core._angle_at(self.s, self.angles, at.reshape(-1)).reshape(at.shape)
-        return values if at.ndim else float(values)
-
-    def curve(self, intervals: int = 1000) -> Curve:
-        """Integrate the tangent by Simpson's rule, from the origin.
-
-        Parameters
-        ----------
-        intervals : int, optional
-            At least 2; every piece of the spline gets an even number, so a few more may be used.
-
-        Returns
-        -------
-        Curve
-            At the ends of double intervals, with a bound of the rule's error (from the fourth
-            derivative of the tangent on every piece). For a linear angle and a turn of pi the
-            error is about 3e-9 of the length with 100 intervals and 3e-13 with 1000. That the
-            spline itself differs from the angle it was sampled from is not in the bound: order 3
-            in the distance of the nodes, 4 where the angle's second derivative vanishes at both
-            ends, nothing for a linear angle.
-
-        Raises
-        ------
-        InvalidInput
-            Fewer than 2 intervals.
-        """
-        return Curve(*_core._angle_curve(self.s, self.angles, intervals))
-
-    def __repr__(self) -> str:
-        """Tell the range."""
-        return f"<AngleFunction of {len(self.s)} nodes, s = {self.s[0]:g} ... {self.s[-1]:g} m>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -356,7 +262,7 @@ class PlanarTrunk:
 
     def _shape(self, turns: Array, misfit: Array | None) -> PlanarShape:
         positions, headings = _core._planar_platforms(*self._given, turns)
-        return PlanarShape(self, _frozen(turns), positions, headings, misfit)
+        return PlanarShape(self, frozen(turns), positions, headings, misfit)
 
     def cable_lengths(
         self, turns: ArrayLike, *, cables: Literal["chords", "arcs"] = "chords"
@@ -427,92 +333,3 @@ class PlanarTrunk:
             *self._given, x, y, heading, limits, tolerance, max_iterations, starts
         )
         return Inverse(trunk=self, method=method, **answer)
-
-
-def two_section_solutions(l1: float, l2: float, x: float, y: float, limit: float = tau) -> Array:
-    """Find every pair of turns that puts the tip of two sections on (x, y).
-
-    Parameters
-    ----------
-    l1, l2 : float
-        Lengths of the sections, base first [m].
-    x, y : float
-        Target of the tip [m].
-    limit : float, optional
-        Largest |turn|, up to 2 pi [rad].
-
-    Returns
-    -------
-    ndarray, shape (S, 2)
-        Turns [rad] by bending energy, least first; (0, 2) where there is no solution. At the edge
-        of the workspace, within 1e-13 of the trunk's length, the double solution is given once.
-
-    Raises
-    ------
-    InvalidInput
-        A length that is not positive, NaN, a limit outside (0, 2 pi].
-    """
-    answer: Array = _core._two_section_solutions(l1, l2, x, y, limit)
-    return answer
-
-
-def two_section_batch(
-    l1: float,
-    l2: float,
-    targets: ArrayLike,
-    limit: float = tau,
-    *,
-    threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
-) -> TwoSectionBatch:
-    """Find every solution of many targets on all cores, with the GIL released.
-
-    Parameters
-    ----------
-    l1, l2, limit
-        As for `two_section_solutions`.
-    targets : array_like, shape (B, 2)
-        One (x, y) per row [m].
-    threads : int, optional
-        Default: all cores. The answer does not depend on it.
-    progress : callable, optional
-        Gets the number of targets done about every 50 ms.
-
-    Returns
-    -------
-    TwoSectionBatch
-        ``batch.turns[batch.row == i]`` are the solutions of target i.
-
-    Raises
-    ------
-    InvalidInput
-        As `two_section_solutions`, naming the row; a number of threads below 1.
-    KeyboardInterrupt
-        On Ctrl-C, within about 0.1 s.
-    """
-    turns, counts = _core._two_section_batch(l1, l2, targets, limit, threads, progress)
-    row = np.repeat(np.arange(len(counts)), counts.astype(np.intp))
-    row.flags.writeable = False
-    return TwoSectionBatch(turns, row, counts)
-
-
-def two_section_nearest(l1: float, l2: float, x: float, y: float, limit: float = tau) -> Nearest:
-    """Find the turns whose tip is nearest to (x, y).
-
-    Parameters and errors are those of `two_section_solutions`. A target that can be reached gives
-    its solution of least bending energy.
-
-    Returns
-    -------
-    Nearest
-        turns (2,) [rad] and distance [m]: the best of the local minima of the distance that a grid
-        of 41 x 41 turns leads to.
-    """
-    return Nearest(*_core._two_section_nearest(l1, l2, x, y, limit))
-
-
-def _frozen(values: ArrayLike) -> Array:
-    """Return a read-only copy as float64."""
-    array = np.array(values, dtype=np.float64)
-    array.flags.writeable = False
-    return array

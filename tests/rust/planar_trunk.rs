@@ -91,7 +91,8 @@ fn a_linear_angle_gives_the_arc() {
     for (length, nodes) in [(0.2, 2), (0.2, 5), (1.0, 11), (3.0, 41)] {
         for k in -8..=8 {
             let turn = PI * f64::from(k) / 8.0;
-            let s: Vec<f64> = (0..nodes).map(|i| length * i as f64 / (nodes - 1) as f64).collect();
+            let s: Vec<f64> =
+                (0..nodes).map(|i| length * f64::from(i) / f64::from(nodes - 1)).collect();
             let angles: Vec<f64> = s.iter().map(|s| turn * s / length).collect();
             let angle = AngleFunction::new(s.clone(), &angles).unwrap();
             for (s, expected) in [(0.0, 0.0), (0.37 * length, 0.37 * turn), (length, turn)] {

@@ -188,8 +188,8 @@ fn closed_circles_are_solutions() {
         for side in [TAU, -TAU] {
             assert!(found.iter().any(|f| near(*f, [turn, side], 1e-9)), "{turn} {found:?}");
         }
-        let found = all(&TwoSections::new(l1, l2, 6.28).unwrap(), target.x, target.y);
-        assert!(found.iter().all(|f| f[1].abs() <= 6.28));
+        let found = all(&TwoSections::new(l1, l2, 6.25).unwrap(), target.x, target.y);
+        assert!(found.iter().all(|f| f[1].abs() <= 6.25));
     }
     // The base itself: one circle of both sections, and each section a circle of its own.
     for l2 in [0.1, 0.03, 0.5] {
@@ -225,7 +225,7 @@ fn reach_and_mirror() {
 #[test]
 fn a_dense_scan_finds_no_more() {
     let n = 500;
-    let width = 2.0 * TAU / n as f64;
+    let width = 2.0 * TAU / f64::from(n);
     let total: usize = (0..40_u64)
         .into_par_iter()
         .map(|case| {
@@ -237,7 +237,7 @@ fn a_dense_scan_finds_no_more() {
             let mut seen: Vec<[f64; 2]> = Vec::new();
             for i in 0..n {
                 for k in 0..n {
-                    let middle = [i, k].map(|i| (i as f64 + 0.5) * width - TAU);
+                    let middle = [i, k].map(|i| (f64::from(i) + 0.5) * width - TAU);
                     // |d tip/d turn1| <= l1/2 + l2, |d tip/d turn2| <= l2/2.
                     let reach = 0.5 * width * (0.5 * l1 + 1.5 * l2);
                     if (two.tip(middle) - aim).norm() > reach {

@@ -7,6 +7,7 @@
 
 mod chord;
 mod inverse;
+mod least_energy;
 mod many;
 mod nearest;
 mod problem;
