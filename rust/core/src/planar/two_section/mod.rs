@@ -11,7 +11,7 @@ use nalgebra::Vector2;
 use super::chord::Point;
 use crate::error::{InvalidInput, length};
 use polish::Tip;
-use search::{EDGE, SAME, Search};
+use search::{CORNER, EDGE, SAME, Search};
 
 /// Two sections of given lengths, ready to be asked for any number of targets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,9 +19,6 @@ pub struct TwoSections {
     lengths: [f64; 2],
     limit: f64,
 }
-
-/// Overshoot of the limit that is rounding \[rad\].
-const SLACK: f64 = 1e-9;
 
 impl TwoSections {
     /// From the lengths of the sections \[m\] and the largest |turn| \[rad\], up to 2 pi.
@@ -70,12 +67,15 @@ impl TwoSections {
         }
         let mut search = Search { tip, target, found, looks: 0 };
         search.run();
+        if target.norm() < CORNER {
+            search.corners();
+        }
         let looks = search.looks;
         self.keep(tip, target, found);
         looks
     }
 
-    /// Clamps to the limit, drops what is beyond it and what is there twice, and sorts.
+    /// Clamps to the limit, drops what then misses the target and what is there twice, and sorts.
     fn keep(&self, tip: Tip, target: Point, found: &mut Vec<[f64; 2]>) {
         if target.norm() <= EDGE {
             // Both sections closed circles: every corner of the square of turns.
@@ -86,9 +86,8 @@ impl TwoSections {
             if turns.iter().all(|turn| turn.abs() <= limit) {
                 return true;
             }
-            let within = turns.iter().all(|turn| turn.abs() <= limit + SLACK);
-            *turns = turns.map(|turn| turn.clamp(-limit, limit));
-            within && (tip.at(*turns).0 - target).norm() <= 5.0 * EDGE
+            *turns = tip.within(*turns, limit, target);
+            (tip.at(*turns).0 - target).norm() <= 5.0 * EDGE
         });
         let mut kept = 0;
         for i in 0..found.len() {

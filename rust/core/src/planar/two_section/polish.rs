@@ -37,6 +37,22 @@ impl Tip {
         self.newton(turns, target)
     }
 
+    /// Turns beyond the limit brought to it, and the other one, if it is not, to where that costs
+    /// least.
+    pub(super) fn within(&self, turns: [f64; 2], limit: f64, target: Point) -> [f64; 2] {
+        let mut held = turns.map(|turn| turn.clamp(-limit, limit));
+        for _ in 0..2 {
+            let (tip, by_first, by_second) = self.at(held);
+            let share = |by: Point| dot(tip - target, by) / by.norm_sqr();
+            if held[0] == turns[0] {
+                held[0] = (held[0] - share(by_first)).clamp(-limit, limit);
+            } else if held[1] == turns[1] {
+                held[1] = (held[1] - share(by_second)).clamp(-limit, limit);
+            }
+        }
+        held
+    }
+
     /// Goes on as long as every step brings the tip nearer. Returns the turns and the miss.
     pub(super) fn newton(&self, mut turns: [f64; 2], target: Point) -> ([f64; 2], f64) {
         let (tip, mut by_first, mut by_second) = self.at(turns);

@@ -16,6 +16,9 @@ pub(super) const EDGE: f64 = 1e-13;
 /// \[rad\]: all turns in one are within `EDGE` of each other's tips.
 const NARROW: f64 = 4e-7;
 
+/// Targets nearer to the base than this are searched at the corners of the square of turns too.
+pub(super) const CORNER: f64 = 1e-3;
+
 /// Values of the equation that are rounding, in trunk lengths.
 const ROUNDING: f64 = 2e-15;
 
@@ -152,7 +155,7 @@ impl Search<'_> {
         // beyond its own end, where sinc is negative.
         let over = TAU.copysign(-equation.angle) + equation.angle;
         let both = equation.angle.abs() + sweep >= PI;
-        let margin = EDGE + ROUNDING * l2 / distance;
+        let margin = self.margin(distance);
         let mut kinds = [(equation.angle, Holds::None), (over, Holds::None)];
         let mut values = [equation.value(l2, equation.angle); 2];
         for (k, (angle, holds)) in kinds.iter_mut().enumerate().take(1 + usize::from(both)) {
@@ -205,7 +208,7 @@ impl Search<'_> {
         // the root.
         let guess = [middle + step, 2.0 * (angle + rate * step)];
         let (turns, miss) = self.tip.newton(guess, self.target);
-        let inside = (turns[0] - middle).abs() <= half
+        let inside = (turns[0] - middle).abs() <= half + SAME
             && (0.5 * turns[1] - angle).abs() <= sweep * (1.0 + 1e-9) + 1e-12;
         if miss <= SHARP && inside {
             self.found.push(turns);
@@ -292,12 +295,48 @@ impl Search<'_> {
         }
         let (equation, angle) = self.equation_at(turn, stretch.angle);
         let at = equation.value(self.tip.l2, angle);
-        if -at.value * at.second.signum() < ROUNDING {
-            return self.note([turn, 2.0 * angle]);
+        let rounding = ROUNDING.max(self.margin(equation.distance) - EDGE);
+        if -at.value * at.second.signum() < rounding {
+            self.note([turn, 2.0 * angle]);
+            if rounding <= ROUNDING {
+                return;
+            }
         }
-        let apart = (-2.0 * at.value / at.second).sqrt();
+        // Where the equation is coarse, the tip itself tells from either side whether there are two.
+        let apart = (2.0 * at.value.abs().max(rounding) / at.second.abs()).sqrt();
         for step in [-apart, apart] {
             self.note([turn + step, 2.0 * (angle + equation.angle_rate[0] * step)]);
+        }
+    }
+
+    /// Values of the equation that may be zero: the edge of the workspace, and the rounding of an angle
+    /// taken at a short distance.
+    fn margin(&self, distance: f64) -> f64 {
+        EDGE + 1e-15 * self.tip.l2 / distance
+    }
+
+    /// Targets all but at the base, where both sections may be all but closed circles and the equation
+    /// is lost in rounding: from the solutions of the tip's expansion to second order in the turns
+    /// short of 2 pi, `-(l1 u + l2 v) = 2 pi x` and
+    /// `s1 l1 u^2 + 2 s1 l2 u v + s2 l2 v^2 = 4 pi y` with the signs s of the turns, and from pairs
+    /// between them that meet the first equation.
+    pub(super) fn corners(&mut self) {
+        let Tip { l1, l2 } = self.tip;
+        let short = -TAU * self.target.re;
+        for (s1, s2) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+            let (whole, lead) = (short / l1, l1 * (s2 * l1 / l2 - s1));
+            let rest = s2 * short * short / l2 - 2.0 * TAU * self.target.im;
+            let apart = (whole * whole - rest / lead).max(0.0).sqrt().min(1.0);
+            let even = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| share * whole);
+            for u in even.into_iter().chain([whole - apart, whole + apart]) {
+                let v = (short - l1 * u) / l2;
+                let guess = [s1 * (TAU - u), s2 * (TAU - v)];
+                self.note(guess);
+                let (turns, miss) = self.tip.settle(guess, self.target);
+                if miss <= EDGE {
+                    self.found.push(turns);
+                }
+            }
         }
     }
 
