@@ -12,9 +12,9 @@ use crate::planar::chord::{Point, cross, sinc};
 /// the workspace is on it.
 pub(super) const EDGE: f64 = 1e-13;
 
-/// Intervals of half this width are halved no more where both sections are all but closed circles
-/// \[rad\]: all turns in one are within `EDGE` of each other's tips.
-const NARROW: f64 = 4e-7;
+/// Reach of the joint's stretch, in trunk lengths, below which it is halved no more where the second
+/// section is all but a closed circle.
+const NARROW: f64 = 1e-12;
 
 /// Targets nearer to the base than this are searched at the corners of the square of turns too.
 pub(super) const CORNER: f64 = 1e-3;
@@ -265,7 +265,7 @@ impl Search<'_> {
         let v1 = l1 * wide / 3.0 + l2 * long * rate;
         let v2 = l2 * (wide * rate + long / 3.0);
         if c2 * v1 + c1 * v2 > 0.25 * area {
-            if half > NARROW {
+            if reach > NARROW && half > NARROW {
                 return false;
             }
             self.note([node.turn, TAU]);
