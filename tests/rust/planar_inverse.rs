@@ -171,8 +171,13 @@ fn nearest_points() {
     assert!(two.nearest(aim.x, aim.y).1 < 1e-15);
     // Within limits the answer stays within them.
     let short = TwoSections::new(0.14, 0.12, 0.5).unwrap();
-    let (turns, _) = short.nearest(0.0, 0.2);
-    assert!(turns.iter().all(|t| t.abs() <= 0.5));
+    for _ in 0..100 {
+        let aim = Vector2::new(u(-0.3, 0.3), u(-0.3, 0.3));
+        let (turns, distance) = short.nearest(aim.x, aim.y);
+        assert!(turns.iter().all(|t| t.abs() <= 0.5));
+        let got = solve(&two_trunk, &goal(aim, None, 0.5));
+        assert!((got.error - distance).abs() < 1e-9, "{aim} {distance} {got:?}");
+    }
 }
 
 /// One section reaches a curve; its tip is the arc through the target (eq. 12).

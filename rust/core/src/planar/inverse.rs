@@ -88,15 +88,19 @@ pub fn inverse(
 ) -> Result<Inverse, InvalidInput> {
     let mut solver = Solver::new(trunk, goal, settings)?;
     let mut starts = solver.exact_starts();
-    let certain = starts.len();
-    // Two sections without a heading: the exact solutions are all there are.
-    if solver.problem.lengths.len() != 2 || goal.heading.is_some() || certain == 0 {
-        starts.extend(solver.spread_starts());
-    }
     for start in &starts {
         solver.try_start(start);
     }
+    // Two sections without a heading: the exact solutions are all there are.
+    if solver.best.is_none() || trunk.lengths().len() != 2 || goal.heading.is_some() {
+        let spread = solver.spread_starts();
+        for start in &spread {
+            solver.try_start(start);
+        }
+        starts.extend(spread);
+    }
     if solver.best.is_none() {
+        starts.extend(solver.nearest_start());
         for start in &starts {
             solver.try_nearest(start);
         }
@@ -217,6 +221,14 @@ impl<'a> Solver<'a> {
             place.collect()
         }));
         starts
+    }
+
+    /// The nearest point of two sections.
+    fn nearest_start(&self) -> Option<Vec<f64>> {
+        let &[l1, l2] = &self.problem.lengths[..] else { return None };
+        let limit = self.problem.limits[0].max(self.problem.limits[1]);
+        let two = TwoSections::new(l1, l2, limit).ok()?;
+        Some(two.nearest(self.problem.target.re, self.problem.target.im).0.to_vec())
     }
 
     /// Whole turns of the heading do not matter: those nearest to a start's are taken.
