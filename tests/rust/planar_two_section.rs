@@ -337,3 +337,20 @@ fn hard_targets_take_little_more() {
     println!("at most {most} intervals, {} in the mean", total / (64 * count));
     assert!(most < 10_000);
 }
+
+/// Sections up to 1e15 times apart: the search ends, and what it finds is right.
+#[test]
+fn extreme_lengths_end() {
+    let mut u = uniform(47);
+    let (mut found, mut most) = (Vec::new(), 0);
+    for case in 0..20_000 {
+        let (l1, l2) = (1.0, 10f64.powf(u(-15.0, 15.0)));
+        let two = TwoSections::new(l1, l2, TAU).unwrap();
+        let turns = [u(-TAU, TAU), if case % 2 == 0 { TAU } else { u(-TAU, TAU) }];
+        let aim = two.tip(turns);
+        most = most.max(two.search(aim.x, aim.y, &mut found));
+        assert!(found.iter().all(|f| (two.tip(*f) - aim).norm() < 1e-12 * (l1 + l2)));
+    }
+    println!("at most {most} intervals");
+    assert!(most < 10_000);
+}

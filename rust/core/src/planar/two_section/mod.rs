@@ -1,5 +1,6 @@
 //! Every pair of turns that puts the tip of two sections on a point.
 
+mod equation;
 mod polish;
 mod search;
 mod table;

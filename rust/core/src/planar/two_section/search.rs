@@ -4,9 +4,10 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::equation::{Bounds, Equation, Holds, Level, judge};
 use super::polish::Tip;
 use super::table::{FIRST, Node, ROOTS, level_start, nodes};
-use crate::planar::chord::{Point, cross, sinc};
+use crate::planar::chord::{Point, cross};
 
 /// Miss of the target that counts as none, in trunk lengths: what is closer than this to the edge of
 /// the workspace is on it.
@@ -28,36 +29,15 @@ const SHARP: f64 = 2e-15;
 /// Solutions whose turns differ by less are one \[rad\].
 pub(super) const SAME: f64 = 1e-8;
 
-/// Bound of the derivative of sin(x)/x for any x.
-const SINC_SLOPE: f64 = 0.436_182;
-
 /// Steps of a safeguarded Newton iteration; halving alone would end it.
 const STEPS: usize = 60;
 
+/// Intervals looked at before halving ends whatever is left: a guard, far above what any target of the
+/// tests takes.
+const MOST: usize = 100_000;
+
 /// Deepest halving: `FIRST / 2^DEPTH` is near the spacing of the numbers.
 const DEPTH: usize = 48;
-
-/// What the equation is at one turn of the first section.
-struct Equation {
-    /// Distance from the joint to the target.
-    distance: f64,
-    /// Angle of the chord to the target against the heading at the joint, in (-pi, pi].
-    angle: f64,
-    sin: f64,
-    cos: f64,
-    /// Derivatives of distance and angle by the turn.
-    distance_rate: [f64; 2],
-    angle_rate: [f64; 2],
-}
-
-/// Value and derivatives of the equation on one sheet of the angle.
-#[derive(Clone, Copy)]
-struct Level {
-    value: f64,
-    slope: f64,
-    second: f64,
-    sinc_slope: f64,
-}
 
 /// A monotone stretch: where it is, and the angle on it.
 struct Stretch {
@@ -76,19 +56,6 @@ struct Interval {
     index: usize,
     turn: f64,
     half: f64,
-}
-
-/// What an interval may hold on one sheet of the angle.
-#[derive(Clone, Copy, PartialEq)]
-enum Holds {
-    /// No root.
-    None,
-    /// One at most: the equation is monotone.
-    One,
-    /// Nothing is known yet.
-    Unknown,
-    /// The equation is within rounding of touching zero all over the interval.
-    Touch,
 }
 
 /// One target of a trunk of two sections, lengths and target in units of the trunk's length.
@@ -117,7 +84,7 @@ impl Search<'_> {
                     Some(start) => self.examine(&table[start + index], half),
                     None => self.examine(&Node::new(turn), half),
                 };
-                if !settled && level < DEPTH {
+                if !settled && level < DEPTH && self.looks < MOST {
                     let (level, half) = (level + 1, 0.5 * half);
                     // The left half on top: roots come in order.
                     stack[top] = Interval { level, index: 2 * index + 1, turn: turn + half, half };
@@ -145,7 +112,7 @@ impl Search<'_> {
             // The joint may reach the target, where the angle has no meaning.
             return self.closed(node, distance + moves, half);
         }
-        let equation = self.equation(node, to, distance);
+        let equation = Equation::new(l1, node, to, distance);
         let bounds = Bounds::new(&equation, [l1, l2], [l1 * node.first_norm, second], least, half);
         let (bend, sweep) = (|value: &Level| bounds.bend(value, half), bounds.sweep);
         if sweep > 1.5 {
@@ -177,25 +144,11 @@ impl Search<'_> {
         true
     }
 
-    fn equation(&self, node: &Node, to: Point, distance: f64) -> Equation {
-        let inverse = 1.0 / distance;
-        let over = to.conj() * (inverse * inverse * self.tip.l1);
-        let (k1, k2) = (node.first * over, node.second * over);
-        Equation {
-            distance,
-            angle: to.im.atan2(to.re),
-            sin: to.im * inverse,
-            cos: to.re * inverse,
-            distance_rate: [-distance * k1.re, distance * (k1.im * k1.im - k2.re)],
-            angle_rate: [-k1.im - 1.0, -k2.im - 2.0 * k1.re * k1.im],
-        }
-    }
-
     /// Equation at any turn, and its angle on the sheet of a reference less than pi away.
     fn equation_at(&self, turn: f64, reference: f64) -> (Equation, f64) {
         let node = Node::new(turn);
         let to = self.target * node.back - node.chord * self.tip.l1;
-        let equation = self.equation(&node, to, to.norm_sqr().sqrt());
+        let equation = Equation::new(self.tip.l1, &node, to, to.norm_sqr().sqrt());
         let angle = equation.angle + TAU * ((reference - equation.angle) / TAU).round();
         (equation, angle)
     }
@@ -346,79 +299,5 @@ impl Search<'_> {
         if miss <= EDGE {
             self.found.push(turns);
         }
-    }
-}
-
-impl Equation {
-    /// Distance minus chord of the second section, turned by twice `angle`.
-    fn value(&self, l2: f64, angle: f64) -> Level {
-        let (value, slope) = sinc(angle, self.sin, self.cos);
-        let (d, a) = (self.distance_rate, self.angle_rate);
-        // sinc'' = -sinc - 2 sinc'/x.
-        let curved = if angle.abs() < 1e-3 { -1.0 / 3.0 } else { -value - 2.0 * slope / angle };
-        Level {
-            value: self.distance - l2 * value,
-            slope: d[0] - l2 * slope * a[0],
-            second: d[1] - l2 * (curved * a[0] * a[0] + slope * a[1]),
-            sinc_slope: slope,
-        }
-    }
-}
-
-/// Bounds over an interval of the derivatives that make up the equation's.
-struct Bounds {
-    l2: f64,
-    /// Second and third derivative of the distance.
-    distance: [f64; 2],
-    /// First, second and third derivative of the angle.
-    angle: [f64; 3],
-    /// How far the angle goes from its middle value.
-    sweep: f64,
-}
-
-impl Bounds {
-    /// From the middle of the interval; `rates` are the first derivative of the joint there and a
-    /// bound of the second. With `d` the vector from the joint to the target and
-    /// `k_n = l1 e^(n)/d`, the derivatives of log d are `-k1`, `-(k2 + k1^2)` and
-    /// `-(k3 + 3 k1 k2 + 2 k1^3)`; its parts are the logarithm of the distance and the angle.
-    fn new(at: &Equation, [l1, l2]: [f64; 2], rates: [f64; 2], least: f64, half: f64) -> Self {
-        let near = 1.0 / least;
-        let k1 = (rates[0] + half * rates[1]) * near;
-        let (k2, k3) = (rates[1] * near, 0.25 * l1 * near);
-        let most = 2.0 * at.distance - least;
-        let (angle2, angle3) = (k2 + k1 * k1, k3 + k1 * (3.0 * k2 + 2.0 * k1 * k1));
-        let middle = [at.angle_rate[0].abs(), at.angle_rate[1].abs()];
-        let angle2 = angle2.min(middle[1] + half * angle3);
-        Self {
-            l2,
-            distance: [most * (k2 + k1 * k1), most * (k3 + k1 * (4.0 * k2 + 3.0 * k1 * k1))],
-            angle: [middle[0] + half * angle2, angle2, angle3],
-            sweep: half * (middle[0] + 0.5 * half * angle2),
-        }
-    }
-
-    /// A bound of the second derivative of the equation, over the interval and directly or from its
-    /// value in the middle. The n-th derivative of sin(x)/x is at most 1/(n + 1).
-    fn bend(&self, at: &Level, half: f64) -> f64 {
-        let [a1, a2, a3] = self.angle;
-        let slope = (at.sinc_slope.abs() + self.sweep / 3.0).min(SINC_SLOPE);
-        let direct = self.distance[0] + self.l2 * (a1 * a1 / 3.0 + slope * a2);
-        let third = self.distance[1] + self.l2 * (a1 * (0.25 * a1 * a1 + a2) + slope * a3);
-        direct.min(at.second.abs() + half * third)
-    }
-}
-
-/// What a bound on the second derivative says of an interval; values within `margin` of zero may be
-/// zero.
-fn judge(at: &Level, bend: f64, half: f64, margin: f64) -> Holds {
-    let curved = 0.5 * bend * half * half;
-    if at.value.abs() > at.slope.abs() * half + curved + margin {
-        Holds::None
-    } else if at.slope.abs() > bend * half {
-        Holds::One
-    } else if curved < margin {
-        Holds::Touch
-    } else {
-        Holds::Unknown
     }
 }
