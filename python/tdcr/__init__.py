@@ -15,7 +15,7 @@ tendon's length inside the robot: negative pulls.
 
 from __future__ import annotations
 
-from tdcr import constant_curvature, pso
+from tdcr import constant_curvature, planar, pso
 from tdcr._batch import ShapeBatch, forward_batch
 from tdcr._core import (
     Backbone,
@@ -69,6 +69,7 @@ __all__ = [
     "inverse_solutions",
     "jacobian",
     "manipulability",
+    "planar",
     "pso",
     "track",
 ]

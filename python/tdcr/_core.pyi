@@ -18,6 +18,9 @@ __all__ = [
     "Shape",
     "Tendon",
     "__version__",
+    "_angle_at",
+    "_angle_coefficients",
+    "_angle_curve",
     "_arc_frames",
     "_arc_from_displacements",
     "_arc_jacobian",
@@ -27,11 +30,21 @@ __all__ = [
     "_inverse",
     "_inverse_batch",
     "_inverse_solutions",
+    "_planar_cable_lengths",
+    "_planar_curve",
+    "_planar_newton",
+    "_planar_newton_defaults",
+    "_planar_platforms",
+    "_planar_trunk",
+    "_planar_turns",
     "_pso_minimize",
     "_rotation_vector",
     "_rust_defaults",
     "_shape",
     "_tendon",
+    "_two_section_batch",
+    "_two_section_nearest",
+    "_two_section_solutions",
     "forward",
     "jacobian",
 ]
@@ -461,6 +474,48 @@ def _pso_minimize(
     callback: Callable[[int, float], object] | None,
     progress: Callable[[int], object] | None,
 ) -> tuple[_Array, float, Status, str, str, int, int, int, _Array]: ...
+def _planar_trunk(lengths: ArrayLike, cable_distance: float) -> tuple[list[float], float]: ...
+def _planar_turns(
+    lengths: ArrayLike, cable_distance: float, cable_lengths: ArrayLike, cables: str
+) -> tuple[_Array, _Array]: ...
+def _planar_cable_lengths(
+    lengths: ArrayLike, cable_distance: float, given: ArrayLike, cables: str
+) -> _Array: ...
+def _planar_platforms(
+    lengths: ArrayLike, cable_distance: float, given: ArrayLike
+) -> tuple[_Array, _Array]: ...
+def _planar_curve(
+    lengths: ArrayLike, cable_distance: float, given: ArrayLike, points: int
+) -> _Array: ...
+def _planar_newton(
+    lengths: ArrayLike,
+    cable_distance: float,
+    x: float,
+    y: float,
+    heading: float | None,
+    limit: ArrayLike,
+    tolerance: float,
+    max_iterations: int,
+    starts: int,
+) -> dict[str, Any]: ...
+def _planar_newton_defaults() -> dict[str, Any]: ...
+def _angle_coefficients(s: ArrayLike, angles: ArrayLike) -> _Array: ...
+def _angle_at(s: ArrayLike, angles: ArrayLike, at: ArrayLike) -> _Array: ...
+def _angle_curve(
+    s: ArrayLike, angles: ArrayLike, intervals: int
+) -> tuple[_Array, _Array, _Array, float]: ...
+def _two_section_solutions(l1: float, l2: float, x: float, y: float, limit: float) -> _Array: ...
+def _two_section_batch(
+    l1: float,
+    l2: float,
+    targets: ArrayLike,
+    limit: float,
+    threads: int | None,
+    progress: Callable[[int], object] | None,
+) -> tuple[_Array, NDArray[np.uint64]]: ...
+def _two_section_nearest(
+    l1: float, l2: float, x: float, y: float, limit: float
+) -> tuple[_Array, float]: ...
 def _rotation_vector(frame: ArrayLike) -> tuple[float, float, float]: ...
 def _rust_defaults() -> dict[str, dict[str, Any]]: ...
 def _tendon(

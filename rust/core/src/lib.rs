@@ -5,8 +5,8 @@
 //!
 //! Rooms, from the bottom up: [`lie`] (rotations and rigid motions), [`solve`] (solvers that know no
 //! robots), [`robot`] (what a robot is), [`model`] (what every forward model offers), [`linkage`]
-//! (the linkage model), [`constant_curvature`], [`batch`] (many solves on all cores), [`inverse`] (from targets to
-//! displacements).
+//! (the linkage model), [`constant_curvature`], [`planar`] (planar trunks), [`batch`] (many solves on
+//! all cores), [`inverse`] (from targets to displacements).
 //!
 //! ```
 //! use tdcr::linkage::{Linkage, LinkageSettings, Plan};
@@ -34,6 +34,7 @@ pub mod inverse;
 pub mod lie;
 pub mod linkage;
 pub mod model;
+pub mod planar;
 pub mod robot;
 mod shape;
 pub mod solve;

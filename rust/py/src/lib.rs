@@ -15,6 +15,7 @@ mod convert;
 mod forward;
 mod inverse;
 mod long_call;
+mod planar;
 mod pso;
 mod pso_settings;
 mod robot;
@@ -39,6 +40,12 @@ mod _core {
     use crate::forward::{_fields, _forward_batch, forward, jacobian};
     #[pymodule_export]
     use crate::inverse::{_inverse, _inverse_batch, _inverse_solutions};
+    #[pymodule_export]
+    use crate::planar::{
+        _angle_at, _angle_coefficients, _angle_curve, _planar_cable_lengths, _planar_curve,
+        _planar_newton, _planar_newton_defaults, _planar_platforms, _planar_trunk, _planar_turns,
+        _two_section_batch, _two_section_nearest, _two_section_solutions,
+    };
     #[pymodule_export]
     use crate::pso::_pso_minimize;
     #[pymodule_export]

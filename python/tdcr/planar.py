@@ -1,0 +1,335 @@
+"""Planar trunks: sections that bend to arcs in one plane, forward and inverse.
+
+x lies along the undeformed trunk, y to its left. A *turn* is the whole angle of a section,
+counter-clockwise. Source: C. Mahfoudi, A. Amouri and A. Zaatri, "New approach to modeling a planar
+flexible continuum robot simulating elephant trunk" (2014); their theta is half a turn.
+
+>>> from tdcr import planar
+>>> trunk = planar.PlanarTrunk([0.200, 0.150], 0.060)
+>>> shape = trunk.forward([(0.170, 0.230), (0.150, 0.150)])
+>>> shape.positions.round(4).tolist()
+[[0.1654, 0.0955], [0.2404, 0.2254]]
+>>> planar.two_section_solutions(0.140, 0.120, 0.230, 0.030).round(6).tolist()
+[[-0.324743, 1.682972], [0.731936, -1.831385]]
+>>> planar.PlanarTrunk([0.1, 0.1, 0.1], 0.01).inverse(0.2, 0.1).status
+<Status.converged: 'converged'>
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import tau
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+import numpy as np
+
+from tdcr import _core
+from tdcr._angle_function import AngleFunction, Curve, frozen
+from tdcr._status import Status
+from tdcr._two_section import (
+    Nearest,
+    TwoSectionBatch,
+    two_section_batch,
+    two_section_nearest,
+    two_section_solutions,
+)
+from tdcr.errors import InvalidInput, NotConverged
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = [
+    "AngleFunction",
+    "Curve",
+    "Inverse",
+    "Nearest",
+    "PlanarShape",
+    "PlanarTrunk",
+    "TwoSectionBatch",
+    "two_section_batch",
+    "two_section_nearest",
+    "two_section_solutions",
+]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlanarShape:
+    """A bent planar trunk.
+
+    Attributes
+    ----------
+    trunk : PlanarTrunk
+    turns : ndarray, shape (m,)
+        Turn of every section [rad].
+    positions : ndarray, shape (m, 2)
+        Platform (end) of every section [m].
+    absolute_headings : ndarray, shape (m,)
+        Direction of every platform's axis against x: the sum of the turns up to there [rad].
+    misfit : ndarray, shape (m,) or None
+        Mean cable length given minus the mean that fits the section [m]; None without cables.
+    """
+
+    trunk: PlanarTrunk
+    turns: Array
+    positions: Array
+    absolute_headings: Array
+    misfit: Array | None = None
+
+    @property
+    def relative_headings(self) -> Array:
+        """Direction of every platform against the one before, (m,) [rad]: the turns."""
+        return self.turns
+
+    @property
+    def tip(self) -> Array:
+        """Position of the last platform, (2,) [m]."""
+        tip: Array = self.positions[-1]
+        return tip
+
+    @property
+    def energy(self) -> float:
+        """Bending energy for EI = 1, sum of turn**2/(2 length) [1/m]."""
+        return float((self.turns**2 / np.array(self.trunk.lengths)).sum() / 2)
+
+    def curve(self, points: int = 50) -> Curve:
+        """Sample the exact arcs: `points` on every section, its two ends included.
+
+        Raises
+        ------
+        InvalidInput
+            Fewer than 2 points.
+        """
+        rows = _core._planar_curve(*self.trunk._given, self.turns, points)
+        return Curve(rows[:, 0], rows[:, 1:3], rows[:, 3], 0.0)
+
+    def angle(self, s: ArrayLike) -> Any:
+        """Angle of the tangent at arc lengths s from the base [rad]: linear on every section."""
+        ends = np.concatenate([[0.0], np.cumsum(self.trunk.lengths)])
+        return np.interp(
+            np.asarray(s, dtype=np.float64), ends, np.concatenate([[0.0], self.absolute_headings])
+        )
+
+    def angle_functions(self, nodes: int = 11) -> list[AngleFunction]:
+        """Return one spline per section through `nodes` evenly spaced angles, ends included.
+
+        Raises
+        ------
+        InvalidInput
+            Fewer than 2 nodes.
+        """
+        if nodes < 2:
+            raise InvalidInput(f"nodes: expected at least 2 per section, got {nodes}", "nodes")
+        ends = np.concatenate([[0.0], np.cumsum(self.trunk.lengths)])
+        pieces = [np.linspace(a, b, nodes) for a, b in pairwise(ends)]
+        return [AngleFunction(s, self.angle(s)) for s in pieces]
+
+    def __repr__(self) -> str:
+        """Tell turns and tip."""
+        x, y = self.tip
+        return f"<PlanarShape: turns {np.round(self.turns, 6).tolist()} rad, tip ({x:g}, {y:g}) m>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Inverse:
+    """Turns that put the tip of a planar trunk on a target, or as near as can be.
+
+    Attributes
+    ----------
+    trunk : PlanarTrunk
+    turns : ndarray, shape (m,)
+        Turn of every section [rad].
+    error : float
+        Distance of the tip from the target [m].
+    heading_error : float
+        Direction of the tip against the heading asked for [rad]; 0 where none was.
+    energy : float
+        Bending energy for EI = 1, sum of turn**2/(2 length) [1/m].
+    status : Status
+        converged; unreachable, with the turns that come nearest; or iteration_limit.
+    method : str
+    iterations, starts : int
+        Newton steps of all starts, and how many were tried.
+    """
+
+    trunk: PlanarTrunk
+    turns: Array
+    error: float
+    heading_error: float
+    energy: float
+    status: Status
+    method: str
+    iterations: int
+    starts: int
+
+    @property
+    def ok(self) -> bool:
+        """Whether it converged."""
+        return self.status == Status.converged
+
+    @property
+    def shape(self) -> PlanarShape:
+        """The trunk at these turns."""
+        return self.trunk.shape(self.turns)
+
+    def require(self) -> Self:
+        """Return itself, or raise `NotConverged` where the target was not reached."""
+        if self.ok:
+            return self
+        message = f"{self.status}: the tip is {self.error:g} m from the target"
+        raise NotConverged(message, self)
+
+    def __repr__(self) -> str:
+        """Tell outcome and turns."""
+        turns = np.round(self.turns, 6).tolist()
+        return f"<Inverse: {self.status}, turns {turns} rad, error {self.error:.1e} m>"
+
+
+@dataclass(frozen=True)
+class PlanarTrunk:
+    """Inextensible sections in a row, each bent to an arc by two cables.
+
+    Cable 1 runs on the left (+y) of the axis, cable 2 on the right.
+
+    Parameters
+    ----------
+    lengths : float or array_like, shape (m,)
+        Length of every section, base first [m].
+    cable_distance : float
+        Between the two cables [m] (the paper's d).
+
+    Raises
+    ------
+    InvalidInput
+        No section, a length or distance that is not positive.
+    """
+
+    lengths: tuple[float, ...]
+    cable_distance: float
+
+    def __init__(self, lengths: ArrayLike, cable_distance: float) -> None:
+        checked, distance = _core._planar_trunk(np.atleast_1d(np.asarray(lengths)), cable_distance)
+        object.__setattr__(self, "lengths", tuple(checked))
+        object.__setattr__(self, "cable_distance", distance)
+
+    @property
+    def _given(self) -> tuple[Sequence[float], float]:
+        return self.lengths, self.cable_distance
+
+    def __len__(self) -> int:
+        """Return the number of sections m."""
+        return len(self.lengths)
+
+    def __reduce__(self) -> tuple[type[PlanarTrunk], tuple[Any, ...]]:
+        """Pickle through the constructor."""
+        return type(self), self._given
+
+    def forward(
+        self, cable_lengths: ArrayLike, *, cables: Literal["chords", "arcs"] = "chords"
+    ) -> PlanarShape:
+        """Find the shape at given cable lengths.
+
+        Parameters
+        ----------
+        cable_lengths : array_like, shape (m, 2)
+            (l1, l2) of every section [m]. Only l2 - l1 is used; what the mean is off the one that
+            fits the section is the shape's `misfit`.
+        cables : {"chords", "arcs"}, optional
+            "chords": straight lines between the platforms, ``l2 - l1 = 2 d sin(turn/2)`` (the
+            paper's eqs. 2-5), turns up to pi. "arcs": parallel to the axis, ``l2 - l1 = d turn``.
+
+        Raises
+        ------
+        InvalidInput
+            Another shape, lengths that are not positive, chords further apart than 2 d, an unknown
+            reading.
+        """
+        turns, misfit = _core._planar_turns(*self._given, cable_lengths, cables)
+        return self._shape(turns, misfit)
+
+    def shape(self, turns: ArrayLike) -> PlanarShape:
+        """Find the shape at given turns, (m,) [rad].
+
+        Raises
+        ------
+        InvalidInput
+            Another number of turns than sections, NaN.
+        """
+        return self._shape(np.atleast_1d(np.asarray(turns)), None)
+
+    def _shape(self, turns: Array, misfit: Array | None) -> PlanarShape:
+        positions, headings = _core._planar_platforms(*self._given, turns)
+        return PlanarShape(self, frozen(turns), positions, headings, misfit)
+
+    def cable_lengths(
+        self, turns: ArrayLike, *, cables: Literal["chords", "arcs"] = "chords"
+    ) -> Array:
+        """Find the cable lengths (l1, l2), (m, 2) [m], of turns (m,) [rad]: the way back.
+
+        Raises
+        ------
+        InvalidInput
+            Turns that do not fit, chords turned by more than pi, a turn that leaves a cable no
+            length, an unknown reading.
+        """
+        given = np.atleast_1d(np.asarray(turns))
+        answer: Array = _core._planar_cable_lengths(*self._given, given, cables)
+        return answer
+
+    def inverse(
+        self,
+        x: float,
+        y: float,
+        *,
+        method: Literal["newton"] = "newton",
+        heading: float | None = None,
+        limit: ArrayLike = tau,
+        tolerance: float = 1e-12,
+        max_iterations: int = 100,
+        starts: int = 16,
+    ) -> Inverse:
+        """Find the turns of least bending energy that put the tip on (x, y).
+
+        Two sections without a heading have finitely many solutions, all of which are found. Other
+        numbers are solved from many starts: the exact solutions of the sections taken as two
+        groups, and turns spread over the limits, the same in every call.
+
+        Parameters
+        ----------
+        x, y : float
+            Target of the tip [m].
+        method : {"newton"}, optional
+            Newton's method on the least energy, from all starts.
+        heading : float, optional
+            Direction of the tip [rad]; whole turns do not matter. Default: any.
+        limit : float or array_like, shape (m,), optional
+            Largest |turn|, up to 2 pi [rad].
+        tolerance : float, optional
+            Miss of the target that counts as none [m]. A heading counts one trunk length per whole
+            turn.
+        max_iterations : int, optional
+            Newton steps per start at most.
+        starts : int, optional
+            Turns spread over the limits that are tried.
+
+        Returns
+        -------
+        Inverse
+            `unreachable` where no start reaches the target: the nearest turns that were found.
+
+        Raises
+        ------
+        InvalidInput
+            NaN, a limit outside (0, 2 pi], another number of limits than sections, settings out of
+            range, an unknown method.
+        """
+        if method != "newton":
+            raise InvalidInput(f'method: expected "newton", got {method!r}', "method")
+        limits = np.atleast_1d(np.asarray(limit))
+        answer = _core._planar_newton(
+            *self._given, x, y, heading, limits, tolerance, max_iterations, starts
+        )
+        return Inverse(trunk=self, method=method, **answer)

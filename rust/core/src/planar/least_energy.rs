@@ -1,0 +1,141 @@
+//! Down the bending energy with the tip on its target.
+
+use nalgebra::Vector3;
+
+use super::problem::{Problem, Work, eliminate};
+
+/// Largest gradient of the energy along the target that counts as none, over the energy's own.
+const STATIONARY: f64 = 1e-11;
+
+/// Lowers the energy along the target: Newton steps in the turns that are free, each brought back
+/// onto the target. Returns whether it ended at a minimum, and the steps taken.
+pub(super) fn descend(
+    problem: &Problem,
+    turns: &mut Vec<f64>,
+    tolerance: f64,
+    most: usize,
+    work: &mut Work,
+) -> (bool, usize) {
+    let (mut energy, mut damping) = (problem.energy(turns), 0.0);
+    let mut trial = turns.clone();
+    for steps in 0..most {
+        problem.linearize(turns, work);
+        let (multipliers, slope) = reduced(problem, turns, work);
+        let free = work.free.iter().filter(|free| **free).count();
+        // With two free turns the target leaves no choice.
+        let fixed = free <= 2 + usize::from(problem.heading.is_some());
+        if fixed || slope <= STATIONARY * (2.0 * energy).sqrt().max(1e-3) {
+            return (true, steps);
+        }
+        tangent_step(problem, turns, &multipliers, damping, work);
+        trial.clone_from(turns);
+        to_the_limit(problem, &mut trial, work);
+        let on = problem.reach(&mut trial, work) <= tolerance;
+        let next = problem.energy(&trial);
+        if on && next < energy {
+            let small = energy - next < 1e-15 * energy;
+            std::mem::swap(turns, &mut trial);
+            energy = next;
+            damping *= 0.1;
+            if small {
+                return (true, steps);
+            }
+        } else {
+            // Differences of the energy end in rounding before its gradient does.
+            if damping > 1e8 {
+                return (slope < 1e-6 * (1.0 + energy), steps);
+            }
+            damping = (10.0 * damping).max(0.1);
+        }
+    }
+    (false, most)
+}
+
+/// Takes the step, or the part of it up to the first limit on the way; holds the turns at limits.
+fn to_the_limit(problem: &Problem, turns: &mut [f64], work: &mut Work) {
+    let mut share = 1.0_f64;
+    let mut first = None;
+    for (i, (turn, step)) in turns.iter().zip(&work.step).enumerate() {
+        let room = problem.limits[i] - turn * step.signum();
+        share = share.min(2.0 / step.abs());
+        if work.free[i] && step.abs() * share > room {
+            (share, first) = ((room / step.abs()).max(0.0), Some(i));
+        }
+    }
+    work.held.clear();
+    work.held.extend(work.free.iter().map(|free| !free));
+    for (turn, step) in turns.iter_mut().zip(&work.step) {
+        *turn += share * step;
+    }
+    if let Some(i) = first {
+        turns[i] = problem.limits[i].copysign(work.step[i]);
+        work.held[i] = true;
+    }
+}
+
+/// Multipliers of the target by least squares over the free turns, and the size of the energy's
+/// gradient that they leave. A turn at its limit is free when the energy would have it come back.
+fn reduced(problem: &Problem, turns: &[f64], work: &mut Work) -> (Vector3<f64>, f64) {
+    let n = turns.len();
+    work.free.clear();
+    work.free.extend(turns.iter().zip(&problem.limits).map(|(turn, limit)| turn.abs() < *limit));
+    for _ in 0..=n {
+        let gram = problem.gram(work, 0.0);
+        let free = |i: &usize| work.free[*i];
+        // The gradient of the energy is turn/length, its weight the length.
+        let right = (0..n)
+            .filter(free)
+            .fold(Vector3::zeros(), |sum: Vector3<f64>, i| sum + problem.row(work, i) * turns[i]);
+        let multipliers = -(gram * right);
+        let left =
+            |i: usize| turns[i] / problem.lengths[i] + problem.row(work, i).dot(&multipliers);
+        let pulled = |i: &usize| !work.free[*i] && left(*i) * turns[*i] > 1e-9;
+        let strength = |i: &usize| left(*i).abs();
+        let back = (0..n).filter(pulled).max_by(|a, b| strength(a).total_cmp(&strength(b)));
+        let slope =
+            (0..n).filter(free).map(|i| problem.lengths[i] * left(i) * left(i)).sum::<f64>();
+        match back {
+            Some(i) => work.free[i] = true,
+            None => return (multipliers, slope.sqrt()),
+        }
+    }
+    (Vector3::zeros(), f64::INFINITY)
+}
+
+/// Newton step of the energy on the linearised target: the saddle-point system of the free turns and
+/// the multipliers, with the second derivatives of the target.
+fn tangent_step(
+    problem: &Problem,
+    turns: &[f64],
+    multipliers: &Vector3<f64>,
+    damping: f64,
+    work: &mut Work,
+) {
+    let n = turns.len();
+    let held = if problem.heading.is_some() { 3 } else { 2 };
+    let size = n + held;
+    work.matrix.clear();
+    work.matrix.resize(size * size, 0.0);
+    work.step.clear();
+    work.step.resize(size, 0.0);
+    for i in 0..n {
+        if !work.free[i] {
+            work.matrix[size * i + i] = 1.0;
+            continue;
+        }
+        for j in (0..n).filter(|j| work.free[*j]) {
+            let second = Problem::second(work, i, j);
+            work.matrix[size * i + j] = multipliers.x * second.re + multipliers.y * second.im;
+        }
+        work.matrix[size * i + i] += (1.0 + damping) / problem.lengths[i];
+        let row = problem.row(work, i);
+        for k in 0..held {
+            work.matrix[size * i + n + k] = row[k];
+            work.matrix[size * (n + k) + i] = row[k];
+        }
+        work.step[i] = -turns[i] / problem.lengths[i];
+    }
+    let Work { matrix, step, .. } = work;
+    eliminate(matrix, step);
+    work.step.truncate(n);
+}

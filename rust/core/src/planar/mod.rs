@@ -1,0 +1,22 @@
+//! Planar trunks: sections bent to arcs in one plane (C. Mahfoudi, A. Amouri, A. Zaatri, "New approach
+//! to modeling a planar flexible continuum robot simulating elephant trunk", 2014).
+//!
+//! x along the undeformed trunk, y to its left; a turn is the whole angle of a section (the paper's
+//! `2 theta`), counter-clockwise. [`Trunk`] and [`AngleFunction`] are the direct model, [`TwoSections`]
+//! finds every solution of two sections, [`inverse`] the one of least bending energy of any number.
+
+mod chord;
+mod inverse;
+mod least_energy;
+mod many;
+mod nearest;
+mod problem;
+mod spline;
+mod trunk;
+mod two_section;
+
+pub use inverse::{Goal, Inverse, InverseSettings, inverse, polish};
+pub use many::{ManySolutions, solve_many};
+pub use spline::{AngleFunction, Curve};
+pub use trunk::{Bent, Cables, Trunk};
+pub use two_section::TwoSections;
