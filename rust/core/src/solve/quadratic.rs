@@ -57,6 +57,10 @@ const MET: f64 = 1e-13;
 /// A row is dependent on the active ones when its part outside them is this small a share of it.
 const DEPENDENT: f64 = 1e-11;
 
+/// A row that depends on active ones contradicts them when it is violated by more than this; below, it is
+/// the rounding of a long way to them.
+const CONTRADICTION: f64 = 1e-9;
+
 /// Buffers of a solve, and its answer.
 #[derive(Clone, Debug, Default)]
 pub struct Quadratic {
@@ -71,6 +75,8 @@ pub struct Quadratic {
     pub active: Vec<usize>,
     /// Their multipliers: `H p + g + sum_k multiplier_k normal_k = 0`; not negative for inequalities.
     pub multipliers: Vec<f64>,
+    /// Rows that depend on active ones and hold as nearly as these do.
+    implied: Vec<usize>,
     /// `L^-1 normal` of every active row.
     images: Vec<f64>,
     /// Orthonormal basis of these.
@@ -159,6 +165,7 @@ impl Quadratic {
     pub fn solve_free(&mut self) {
         self.active.clear();
         self.multipliers.clear();
+        self.implied.clear();
         self.images.clear();
         self.basis.clear();
         self.triangle.clear();
@@ -180,7 +187,10 @@ impl Quadratic {
             let (mut worst, mut row) = (MET, usize::MAX);
             for k in rows.equalities..rows.offsets.len() {
                 let off = dot(rows.normal(size, k), &self.step) - rows.offsets[k];
-                if off > worst * (1.0 + rows.offsets[k].abs()) && !self.active.contains(&k) {
+                if off > worst * (1.0 + rows.offsets[k].abs())
+                    && !self.active.contains(&k)
+                    && !self.implied.contains(&k)
+                {
                     (worst, row) = (off, k);
                 }
             }
@@ -268,7 +278,11 @@ impl Quadratic {
             let (length, leaving) = self.first_to_leave(rows.equalities);
             let full = outside > DEPENDENT * whole;
             if !full && leaving == usize::MAX {
-                return Outcome::Infeasible;
+                if violation > CONTRADICTION || multiplier > 0.0 {
+                    return Outcome::Infeasible;
+                }
+                self.implied.push(row);
+                return Outcome::Solved;
             }
             // |outside|^2 is the curvature along the move.
             let whole_move = if full { violation / outside } else { f64::INFINITY };
