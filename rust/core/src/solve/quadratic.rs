@@ -54,8 +54,12 @@ pub enum Outcome {
 /// Violations below this count as met; steps and normals are of order 1.
 const MET: f64 = 1e-13;
 
-/// A row is dependent on the active ones when its part outside them is this small a share of it.
+/// An equation is dependent on others when the square of its part outside them, in the Hessian's metric, is
+/// this small a share of it: rows of a Jacobian near where it is singular.
 const DEPENDENT: f64 = 1e-11;
+/// The same for an inequality: independent rows come as near as the inverse of the Hessian's condition
+/// (1e13 for least squares with freedom left), dependent ones as near as the rounding of their images.
+const PARALLEL: f64 = 1e-16;
 
 /// A row that depends on active ones contradicts them when it is violated by more than this; below, it is
 /// the rounding of a long way to them.
@@ -276,7 +280,7 @@ impl Quadratic {
             let outside = dot(&self.outside, &self.outside);
             self.solve_triangle();
             let (length, leaving) = self.first_to_leave(rows.equalities);
-            let full = outside > DEPENDENT * whole;
+            let full = outside > PARALLEL * whole;
             if !full && leaving == usize::MAX {
                 if violation > CONTRADICTION || multiplier > 0.0 {
                     return Outcome::Infeasible;
