@@ -10,12 +10,18 @@
 mod batch;
 mod common;
 mod constant_curvature;
+mod inverse;
+mod inverse_bounds;
+mod inverse_common;
 mod lie;
 mod linkage_bars;
 mod linkage_chain;
 mod linkage_drive;
 mod linkage_random;
+mod optimality;
 mod robot;
+mod solve;
+mod solve_quadratic;
 
 /// Every file beside this one is a module of this target: a forgotten one would never run.
 #[test]
