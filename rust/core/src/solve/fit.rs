@@ -71,8 +71,9 @@ const STUCK: f64 = 1e12;
 const HEADWAY: f64 = 1e-3;
 /// ...and this many of them are a stall.
 const PATIENCE: usize = 5;
-/// Weight of rows along which no step is wanted, over the size of the Hessian.
-const STIFF: f64 = 10.0;
+/// Weight of rows along which no step is wanted, over the size of the Hessian: enough for strong multipliers,
+/// whose curvature across the rows would otherwise have to be damped away.
+const STIFF: f64 = 100.0;
 /// A row adds nothing to others when this share of its square is outside them.
 const DEPENDENT: f64 = 1e-12;
 /// A minimum is found when the gradient of the Lagrangian is this share of what it can be.
