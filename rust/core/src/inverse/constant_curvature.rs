@@ -255,24 +255,24 @@ impl<'a> ConstantCurvatureInverse<'a> {
         }
     }
 
-    /// All segments on the circle that leaves the base along z and passes the target.
+    /// All segments on the circle that leaves the base along z and brings the tool to the target.
     fn single_arc(&self, target: &Target, point: &mut Vec<f64>) {
-        let mut tip = target.position();
-        let tool = self.robot.tool();
-        if let Target::Pose(pose) = target {
-            tip = pose.compose(&tool.inverse()).translation;
-        }
-        let local: Vector3<f64> = self.robot.base().inverse().transform(&tip);
-        let across = local.x.hypot(local.y);
-        let half = across.atan2(local.z);
-        let angle = 2.0 * half;
-        let length = if half > 0.0 { local.norm() * half / half.sin() } else { local.norm() };
-        let direction =
-            if across > 0.0 { Vector2::new(local.x, local.y) / across } else { Vector2::x() };
+        let (base, tool) = (self.robot.base().inverse(), self.robot.tool());
         let rest: f64 = self.plan.segments().map(|segment| segment.rest_length).sum();
+        let (bend, length) = match target {
+            Target::Pose(pose) => {
+                let tip = pose.compose(&tool.inverse()).translation;
+                arc_to(&base.transform(&tip), &Vector3::zeros(), rest)
+            }
+            Target::Position(position) => {
+                arc_to(&base.transform(position), &tool.translation, rest)
+            }
+        };
+        let angle = bend.norm();
         for (segment, (widest, shortest, longest)) in self.plan.segments().zip(&self.reach.draws) {
-            let bend = direction * (angle * segment.rest_length / rest).min(*widest);
-            point.extend_from_slice(bend.as_slice());
+            let share = segment.rest_length / rest;
+            let share = if angle * share > *widest { widest / angle } else { share };
+            point.extend_from_slice((bend * share).as_slice());
             if self.plan.width() == 3 {
                 point.push((length / rest).clamp(*shortest, *longest));
             }
@@ -303,6 +303,30 @@ impl<'a> ConstantCurvatureInverse<'a> {
             }
         }
     }
+}
+
+/// Bending vector and length of the arc that leaves the origin along z and brings `tool`, given in the frame
+/// of its end, to `point`; of two, the one nearer to a length.
+///
+/// What the tool is off the axis across the bending plane stays as it is, so `point - tool` lies in that
+/// plane; what it is off along the plane, i, is as if the radius were less by i: at half the angle h, with
+/// `q = (r - i) sin h + tool_z cos h`, `point - tool` is at `2 q sin h` across and `point` at
+/// `2 q cos h - tool_z` along z.
+fn arc_to(point: &Vector3<f64>, tool: &Vector3<f64>, wanted: f64) -> (Vector2<f64>, f64) {
+    let off = (point - tool).xy();
+    let (across, along) = (off.norm(), point.z + tool.z);
+    let direction = if across > 0.0 { off / across } else { Vector2::x() };
+    // Bent towards the point, and away from it where the tool leads back (q < 0).
+    let arc = |side: f64| {
+        let half = across.atan2(side * along);
+        let spread = 0.5 * side * across.hypot(along) - tool.z * half.cos();
+        let per_sine = if half > 0.0 { half / half.sin() } else { 1.0 };
+        let aside = side * direction.dot(&tool.xy());
+        (direction * (2.0 * side * half), 2.0 * (spread * per_sine + aside * half))
+    };
+    let (near, far) = (arc(1.0), arc(-1.0));
+    // A negative length is no arc.
+    if far.1 > 0.0 && (far.1 - wanted).abs() < (near.1 - wanted).abs() { far } else { near }
 }
 
 /// Unknowns that differ by more than this are other answers.

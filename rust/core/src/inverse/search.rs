@@ -44,48 +44,57 @@ pub(super) struct Effort {
 
 impl Search<'_> {
     /// Tries `start(k, point)` for k = 0, 1, ... until a descent meets the target; else finds the point
-    /// nearest to it. `point` holds the answer whatever the status.
+    /// nearest to it. `point` holds the answer whatever the status, and was evaluated last.
     pub(super) fn run<P: Problem<6>>(
         &mut self,
         problem: &mut P,
         region: &Region,
         effort: Effort,
-        mut start: impl FnMut(usize, &mut Vec<f64>),
+        start: impl FnMut(usize, &mut Vec<f64>),
     ) -> Found {
+        let (status, starts) = self.seek(problem, region, effort, start);
+        if status != Status::Converged {
+            self.fit.evaluate(problem, &self.point);
+        }
+        Found { status, iterations: self.fit.iterations, starts }
+    }
+
+    /// How the search ended, and after how many starts.
+    fn seek<P: Problem<6>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        effort: Effort,
+        mut start: impl FnMut(usize, &mut Vec<f64>),
+    ) -> (Status, usize) {
         self.fit.iterations = 0;
         self.candidates.clear();
         for k in 0..effort.starts {
-            if self.stopped() {
-                return self.found(Status::IterationLimit, k);
+            if k > 0 && self.stopped() {
+                return (Status::IterationLimit, k);
             }
             start(k, &mut self.point);
             if !self.fit.restore(region, &mut self.point) {
                 if k == 0 {
-                    return self.found(Status::Infeasible, 1);
+                    return (Status::Infeasible, 1);
                 }
                 continue;
             }
             let limit = effort.max_iterations;
             match self.fit.descend(problem, region, &mut self.point, Purpose::Meet, limit) {
                 Ending::Met => {
-                    let status = self.spend_freedom(problem, region, effort);
-                    return self.found(status, k + 1);
+                    return (self.spend_freedom(problem, region, effort), k + 1);
                 }
                 Ending::Failed => {}
                 Ending::Stalled | Ending::IterationLimit => self.remember(),
             }
         }
-        let status = self.nearest(problem, region, effort);
-        self.found(status, effort.starts)
+        (self.nearest(problem, region, effort), effort.starts)
     }
 
     /// Whether it was told to end.
     pub(super) fn stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
-    }
-
-    fn found(&self, status: Status, starts: usize) -> Found {
-        Found { status, iterations: self.fit.iterations, starts }
     }
 
     /// Lowers the energy where the target leaves freedom.
