@@ -117,6 +117,14 @@ impl Curved {
         }
     }
 
+    fn residual(&self, z: &[f64]) -> SVector<f64, 3> {
+        let point = SVector::<f64, SIZE>::from_column_slice(z);
+        SVector::from_fn(|k, _| {
+            let curved = 0.5 * point.dot(&(self.square[k] * point));
+            self.linear[k].dot(&point) + curved - self.wanted[k]
+        })
+    }
+
     fn slope(&self, z: &[f64], k: usize) -> SVector<f64, SIZE> {
         self.linear[k] + self.square[k] * SVector::<f64, SIZE>::from_column_slice(z)
     }
@@ -124,13 +132,15 @@ impl Curved {
 
 impl Problem<3> for Curved {
     fn evaluate(&mut self, z: &[f64], r: &mut SVector<f64, 3>, j: &mut [SVector<f64, 3>]) {
-        let point = SVector::<f64, SIZE>::from_column_slice(z);
+        *r = self.residual(z);
         for k in 0..3 {
-            r[k] = self.linear[k].dot(&point) + 0.5 * point.dot(&(self.square[k] * point))
-                - self.wanted[k];
             let slope = self.slope(z, k);
             (0..SIZE).for_each(|i| j[i][k] = slope[i]);
         }
+    }
+
+    fn squared(&mut self, z: &[f64]) -> f64 {
+        self.residual(z).norm_squared()
     }
 
     fn met(&self, residual: &SVector<f64, 3>) -> bool {

@@ -112,6 +112,13 @@ impl<'a> Chain<'a> {
         }
     }
 
+    /// Residuals of the last placing.
+    fn residual(&self) -> Vector6<f64> {
+        let off = self.target.position() - self.tool;
+        let turn = if self.target.rotation().is_some() { self.error } else { Vector3::zeros() };
+        Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z).component_mul(&self.weights)
+    }
+
     /// Derivatives of the tool's place and rotation by every unknown.
     fn differentiate(&mut self) {
         self.columns.clear();
@@ -155,12 +162,8 @@ impl Problem<6> for Chain<'_> {
     fn evaluate(&mut self, z: &[f64], residual: &mut Vector6<f64>, jacobian: &mut [Vector6<f64>]) {
         self.place(z);
         self.differentiate();
-        let off = self.target.position() - self.tool;
+        *residual = self.residual();
         let rotates = self.target.rotation().is_some();
-        for k in 0..3 {
-            residual[k] = self.weights[k] * off[k];
-            residual[k + 3] = if rotates { self.weights[k + 3] * self.error[k] } else { 0.0 };
-        }
         for (column, (velocity, spin)) in jacobian.iter_mut().zip(&self.columns) {
             let turned = if rotates { self.back * spin } else { Vector3::zeros() };
             for k in 0..3 {
@@ -168,6 +171,11 @@ impl Problem<6> for Chain<'_> {
                 column[k + 3] = -self.weights[k + 3] * turned[k];
             }
         }
+    }
+
+    fn squared(&mut self, z: &[f64]) -> f64 {
+        self.place(z);
+        self.residual().norm_squared()
     }
 
     fn met(&self, residual: &Vector6<f64>) -> bool {

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use super::bounds::{Bounds, Reach, rest};
 use super::chain::Chain;
 use super::search::{Effort, Found, Search};
-use super::{InverseSettings, Target};
+use super::{InverseSettings, Method, Target};
 use crate::constant_curvature::{Arc, Plan, displacements};
 use crate::error::InvalidInput;
 use crate::robot::Robot;
@@ -105,11 +105,10 @@ impl<'a> ConstantCurvatureInverse<'a> {
         work.chain.aim(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
         let given = usize::from(start.is_some());
-        let found =
-            work.search.run(&mut work.chain, &self.reach.region, effort, |k, point| match start {
-                Some(arcs) if k == 0 => self.unknowns(arcs, point),
-                _ => self.start(target, k - given, point),
-            });
+        let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| match start {
+            Some(arcs) if k == 0 => self.unknowns(arcs, point),
+            _ => self.start(target, k - given, point),
+        });
         Self::answer(found, &work.chain)
     }
 
@@ -118,7 +117,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
     pub fn follow(&self, target: &Target, work: &mut Workspace<'_>) -> Answer {
         work.chain.aim(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
-        let found = work.search.run(&mut work.chain, &self.reach.region, effort, |k, point| {
+        let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| {
             if k > 0 {
                 self.start(target, k - 1, point);
             }
@@ -137,14 +136,14 @@ impl<'a> ConstantCurvatureInverse<'a> {
     #[must_use]
     pub fn solutions_in(&self, target: &Target, work: &mut Workspace<'_>) -> Vec<Solution> {
         work.chain.aim(*target);
-        let effort = Effort { starts: 1, ..self.effort(&work.chain, 1) };
         let mut distinct: Vec<(Vec<f64>, Solution)> = Vec::new();
         let mut slope = vec![0.0; self.reach.region.size()];
         for k in 0..self.settings.starts {
             if work.search.stopped() {
                 break;
             }
-            let found = work.search.run(&mut work.chain, &self.reach.region, effort, |_, point| {
+            let effort = Effort { first: k, ..self.effort(&work.chain, 1) };
+            let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| {
                 self.start(target, k, point);
             });
             if found.status != Status::Converged {
@@ -166,11 +165,15 @@ impl<'a> ConstantCurvatureInverse<'a> {
         distinct.into_iter().map(|(_, solution)| solution).collect()
     }
 
-    fn effort(&self, chain: &Chain<'_>, starts: usize) -> Effort {
+    fn effort(&self, chain: &Chain<'_>, starts: usize) -> Effort<'_> {
         Effort {
+            first: 0,
             starts,
             max_iterations: self.settings.max_iterations,
-            redundant: self.reach.freedoms > chain.rows(),
+            redundant: self.settings.least_energy && self.reach.freedoms > chain.rows(),
+            method: self.settings.method,
+            fall_back: self.settings.method == Method::Newton && starts > 1,
+            swarm: &self.settings.swarm,
         }
     }
 

@@ -23,6 +23,9 @@ pub trait Problem<const R: usize> {
         jacobian: &mut [SVector<f64, R>],
     );
 
+    /// The squared residuals alone.
+    fn squared(&mut self, z: &[f64]) -> f64;
+
     /// Whether residuals are as small as wanted.
     fn met(&self, residual: &SVector<f64, R>) -> bool;
 
