@@ -1,5 +1,7 @@
 //! What an inverse may use, and the region of unknowns it leaves.
 
+use std::f64::consts::{PI, TAU};
+
 use crate::constant_curvature::Plan;
 use crate::error::InvalidInput;
 use crate::solve::region::{Disc, Region};
@@ -73,7 +75,7 @@ pub struct Bounds {
 }
 
 /// No segment turns further \[rad\]: beyond one turn an arc runs through itself.
-const TURN: f64 = std::f64::consts::TAU;
+const TURN: f64 = TAU;
 /// Shortest and longest segment over its rest length, unless bounds say otherwise.
 const STRETCH: (f64, f64) = (0.5, 2.0);
 
@@ -81,7 +83,8 @@ const STRETCH: (f64, f64) = (0.5, 2.0);
 #[derive(Clone, Debug)]
 pub(super) struct Reach {
     pub(super) region: Region,
-    /// A box around it.
+    /// The box of swarms: that of the region, but for turns beyond half a one, to which descents may
+    /// lead.
     pub(super) lower: Vec<f64>,
     pub(super) upper: Vec<f64>,
     /// Largest angle \[rad\], shortest and longest length over the rest length, per segment.
@@ -166,6 +169,7 @@ impl Reach {
         }
         bound_displacements(plan, bounds, tendons, &mut region, &mut labels.0);
         let sides = draws.iter().flat_map(|&(widest, shortest, longest)| {
+            let widest = widest.min(PI);
             [(-widest, widest), (-widest, widest), (shortest, longest)].into_iter().take(width)
         });
         let (lower, upper) = sides.unzip();
