@@ -65,9 +65,6 @@ const PARALLEL: f64 = 1e-16;
 /// the rounding of a long way to them.
 const CONTRADICTION: f64 = 1e-9;
 
-/// A squared length that is reduced to less than this share has lost digits.
-const CANCELLED: f64 = 1e-2;
-
 /// Buffers of a solve, and its answer.
 #[derive(Clone, Debug, Default)]
 pub struct Quadratic {
@@ -348,10 +345,7 @@ impl Quadratic {
                 *rest -= along * d;
             }
         }
-        // Where little is left, much of it is rounding: once more.
-        if dot(&self.outside, &self.outside) > CANCELLED * dot(&self.image, &self.image) {
-            return;
-        }
+        // What is small is mostly rounding: once more.
         for (k, direction) in self.basis.chunks_exact(size).enumerate() {
             let along = dot(direction, &self.outside);
             self.inside[k] += along;
