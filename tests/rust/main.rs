@@ -25,6 +25,7 @@ mod planar_two_section;
 mod pso;
 mod pso_rates;
 mod robot;
+mod rod_golden;
 mod solve;
 mod solve_quadratic;
 

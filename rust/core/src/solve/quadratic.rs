@@ -105,7 +105,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Cholesky factor in place of the lower triangle, row by row, its diagonal inverted; false unless
 /// positive definite.
-fn cholesky(matrix: &mut [f64], size: usize) -> bool {
+pub(crate) fn cholesky(matrix: &mut [f64], size: usize) -> bool {
     for i in 0..size {
         for j in 0..=i {
             let (above, below) = matrix.split_at_mut(i * size);
@@ -127,7 +127,7 @@ fn cholesky(matrix: &mut [f64], size: usize) -> bool {
 }
 
 /// Solves `L x = x` in place.
-fn forward(factor: &[f64], size: usize, x: &mut [f64]) {
+pub(crate) fn forward(factor: &[f64], size: usize, x: &mut [f64]) {
     for i in 0..size {
         let row = &factor[i * size..i * size + i];
         x[i] = (x[i] - dot(row, &x[..i])) * factor[i * size + i];
@@ -135,7 +135,7 @@ fn forward(factor: &[f64], size: usize, x: &mut [f64]) {
 }
 
 /// Solves `L^T x = x` in place.
-fn backward(factor: &[f64], size: usize, x: &mut [f64]) {
+pub(crate) fn backward(factor: &[f64], size: usize, x: &mut [f64]) {
     for i in (0..size).rev() {
         x[i] *= factor[i * size + i];
         let value = x[i];
