@@ -19,9 +19,8 @@ struct Coefficient(f64, f64, f64);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Element {
     strain: Vector3<f64>,
-    /// Length with its elongation, and without \[m\].
+    /// \[m\]
     length: f64,
-    rest_length: f64,
     kind: Subsegment,
     a: Coefficient,
     b: Coefficient,
@@ -35,13 +34,8 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// An element of rest length \[m\] that turns by a rotation vector \[rad\] and is stretched by a share.
-    pub(super) fn new(
-        kind: Subsegment,
-        rest_length: f64,
-        strain: Vector3<f64>,
-        stretch: f64,
-    ) -> Self {
+    /// An element of a length \[m\] that turns by a rotation vector \[rad\].
+    pub(super) fn new(kind: Subsegment, length: f64, strain: Vector3<f64>) -> Self {
         let angle = Angle::of(&strain);
         let (a, b, c) = (angle.a(), angle.b(), angle.c());
         let (b1, c1) = (angle.b_slope(), angle.c_slope());
@@ -49,7 +43,6 @@ impl Element {
         let a = Coefficient(a, c - b, c1 - b1);
         let b = Coefficient(b, b1, angle.b_bend());
         let c = Coefficient(c, c1, angle.c_bend());
-        let length = rest_length * (1.0 + stretch);
         let rotation = quadratic(&strain, a.0, b.0);
         let spin = quadratic(&strain, b.0, c.0);
         let (translation, sweep) = match kind {
@@ -64,12 +57,7 @@ impl Element {
             }
         };
         let end = Pose { rotation, translation };
-        Self { strain, length, rest_length, kind, a, b, c, end, spin, sweep }
-    }
-
-    /// Velocity of its end's origin by the stretch \[m\].
-    pub(super) fn stretched(&self) -> Vector3<f64> {
-        self.end.translation * (self.rest_length / self.length)
+        Self { strain, length, kind, a, b, c, end, spin, sweep }
     }
 
     /// Second derivatives by the strain of `sum u·(origin + Exp(w) x)` over tendons, given the sums of
@@ -168,7 +156,7 @@ mod tests {
             for size in [0.0, 1e-5, 0.3, 2.0] {
                 let (strain, u, x) =
                     (vector(&mut seed) * size, vector(&mut seed), vector(&mut seed));
-                let at = |w: Vector3<f64>| Element::new(kind, 0.7, w, 0.1);
+                let at = |w: Vector3<f64>| Element::new(kind, 0.7, w);
                 let value = |w: Vector3<f64>| u.dot(&at(w).end.transform(&x));
                 let slope = |w: Vector3<f64>| {
                     let e = at(w);

@@ -43,6 +43,57 @@ impl<'r> Rod<'r> {
         Self { robot, plan }
     }
 
+    /// The shape under given tensions, in the unit of the results: displacements are then what it has. A
+    /// minimum that rest leads to as the tensions grow together; infeasible beyond where it ends.
+    ///
+    /// # Errors
+    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
+    pub fn solve_tensions(
+        &self,
+        tensions: &[f64],
+        work: &mut Workspace,
+    ) -> Result<Report, InvalidInput> {
+        if tensions.len() != self.plan.rest_lengths.len() {
+            let expected = format!("{} values, one per tendon", self.plan.rest_lengths.len());
+            return Err(InvalidInput::new("tensions", expected, tensions.len()));
+        }
+        if let Some(bad) = tensions.iter().find(|t| !(t.is_finite() && **t >= 0.0)) {
+            let expected = "finite tensions of 0 or more";
+            return Err(InvalidInput::new("tensions", expected, format!("{bad:?}")));
+        }
+        let mut budget = self.plan.settings.max_iterations;
+        work.chain.rest(self.plan);
+        // All free: the lengths are what the tensions make them.
+        work.bounds.clear();
+        work.bounds.resize(tensions.len(), f64::INFINITY);
+        work.reached.0.clone_from(&work.chain.strains);
+        let (mut load, mut stride) = (0.0, 1.0_f64);
+        let mut status = Status::Converged;
+        while load < 1.0 {
+            let next = (load + stride).min(1.0);
+            for (own, wanted) in work.chain.tensions.iter_mut().zip(tensions) {
+                *own = next * wanted / self.plan.unit;
+            }
+            if self.newton(work, &mut budget) {
+                load = next;
+                stride *= 2.0;
+                work.reached.0.clone_from(&work.chain.strains);
+            } else {
+                work.chain.strains.clone_from(&work.reached.0);
+                stride = 0.5 * (next - load);
+                if budget == 0 || stride < SHORTEST {
+                    status = if budget == 0 { Status::IterationLimit } else { Status::Infeasible };
+                    work.left = work.chain.assemble(self.plan, &work.bounds);
+                    break;
+                }
+            }
+        }
+        work.load = load;
+        self.report(work);
+        let iterations = self.plan.settings.max_iterations - budget;
+        Ok(Report { status, residual: work.left.worst(), iterations })
+    }
+
     /// Newton's method from the point at hand; whether it converged to a minimum.
     fn newton(&self, work: &mut Workspace, budget: &mut usize) -> bool {
         let mut before = f64::INFINITY;

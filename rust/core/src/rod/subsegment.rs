@@ -65,7 +65,7 @@ impl Local {
         self.frames.push(frame);
         for strain in strains.chunks_exact(3) {
             let strain = Vector3::from_column_slice(strain);
-            let element = Element::new(kind, data.length, strain, 0.0);
+            let element = Element::new(kind, data.length, strain);
             frame = frame.compose(&element.end);
             self.frames.push(frame);
             self.elements.push(element);

@@ -187,7 +187,7 @@ impl Quadratic {
         }
         let size = self.size;
         // Every pass adds a row for good or ends; the bound is for arithmetic gone wrong.
-        for _ in 0..4 * (size + rows.offsets.len()) {
+        for _ in 0..=4 * (size + rows.offsets.len()) {
             let (mut worst, mut row) = (MET, usize::MAX);
             for k in rows.equalities..rows.offsets.len() {
                 let off = dot(rows.normal(size, k), &self.step) - rows.offsets[k];
