@@ -136,7 +136,7 @@ def test_bounds_on_displacements_hold_and_are_named():
         held = tdcr.inverse(robot, [0.05, 0.0, 0.08], model=MODEL, bounds=bounds)
         assert held.status is Status.unreachable
         assert held.displacements.min() == pytest.approx(-0.003, abs=1e-12)
-        assert "pull of tendon 0" in held.message
+        assert "pull of 't0'" in held.message
 
 
 def test_bounds_that_exclude_each_other_are_infeasible():

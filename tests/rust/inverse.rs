@@ -341,7 +341,7 @@ fn solutions_are_distinct_and_most_are_found() {
             for (i, solution) in solutions.iter().enumerate() {
                 assert_eq!(solution.answer.status, Status::Converged);
                 assert!(inside(&solution.arcs, &bounds), "{case}");
-                let given = solution.displacements(&plan);
+                let given = solution.displacements.clone();
                 let (distance, angle) = misses(&tool(&robot, &plan, &given), &target);
                 assert!(distance < 1e-9 && angle < 1e-9, "{case}");
                 let others = &solutions[..i];

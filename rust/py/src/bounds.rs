@@ -18,7 +18,8 @@ use crate::convert::{invalid, list_text, one_or_tuple, type_name};
 /// ----------
 /// displacement : (lower, upper), optional
 ///     Of tendon displacements [m]: numbers, or sequences with one value per tendon. Negative pulls;
-///     infinite is no bound. The only tendon of a segment is never released.
+///     infinite is no bound. The only tendon of a segment is never released: shapes that leave its
+///     segment straight are not sought.
 /// curvature : float or sequence of float, optional
 ///     Largest curvature, one value or one per segment [1/m]. No segment turns by more than a full turn.
 /// length : (lower, upper), optional

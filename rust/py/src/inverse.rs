@@ -23,8 +23,17 @@ use crate::long_call;
 use crate::robot::Robot;
 use crate::settings::InverseSettings;
 
-/// Starts up to which a single inverse ends soon enough to go without listening for Ctrl-C.
-const SOON: usize = 1000;
+/// Steps and evaluations, of a few tenths of a microsecond each, up to which a single inverse ends soon
+/// enough to go without listening for Ctrl-C.
+const SOON: usize = 200_000;
+
+/// Whether it does.
+fn soon(search: &tdcr::inverse::InverseSettings) -> bool {
+    let starts = if search.method == Method::Swarm { search.starts } else { 1 };
+    let swarms = search.swarm.particles.saturating_mul(search.swarm.max_iterations);
+    let steps = search.starts.saturating_mul(search.max_iterations);
+    steps.saturating_add(swarms.saturating_mul(starts)) <= SOON
+}
 
 /// One target from its numbers: 3 of a position or 16 of a frame.
 fn target(argument: &str, numbers: &[f64]) -> Result<Target, InvalidInput> {
@@ -139,7 +148,7 @@ impl<'a> Problem<'a> {
             return Err(wrong_shape("start", &expected, array.shape()));
         }
         let given = values(&array)?.chunks_exact(tendons.max(1));
-        given.map(|displacements| self.arcs("start", displacements)).collect()
+        given.enumerate().map(|(row, d)| self.arcs(&format!("start[{row}]"), d)).collect()
     }
 }
 
@@ -183,7 +192,7 @@ pub(crate) fn _inverse(
         inverse.write_displacements(&work, &mut displacements);
         (displacements, answer, inverse.message(&answer, &work))
     };
-    let (displacements, answer, message) = if inverse.settings().starts <= SOON {
+    let (displacements, answer, message) = if soon(inverse.settings()) {
         py.detach(|| solve(inverse.workspace()))
     } else {
         long_call::run(py, None, |control| solve(inverse.workspace().stopped_by(&control.stop)))?
@@ -211,8 +220,10 @@ pub(crate) fn _inverse_solutions(
         inverse.solutions_in(&target, &mut inverse.workspace().stopped_by(&control.stop))
     })?;
     let rows = solutions.iter().map(|solution| {
-        let displacements = solution.displacements(problem.plan);
-        Ok((row(py, displacements, &solution.answer, String::new())?, solution.hits))
+        Ok((
+            row(py, solution.displacements.clone(), &solution.answer, String::new())?,
+            solution.hits,
+        ))
     });
     rows.collect()
 }

@@ -2,8 +2,11 @@
 
 use std::f64::consts::{PI, TAU};
 
+use nalgebra::DMatrix;
+
 use crate::constant_curvature::Plan;
 use crate::error::InvalidInput;
+use crate::solve::least_squares::null_space;
 use crate::solve::region::{Disc, Region};
 
 /// Lowest and highest values, one pair for all or one for each.
@@ -79,6 +82,11 @@ const TURN: f64 = TAU;
 /// Shortest and longest segment over its rest length, unless bounds say otherwise.
 const STRETCH: (f64, f64) = (0.5, 2.0);
 
+/// An arc that may turn by less than this is straight \[rad\].
+const STRAIGHT: f64 = 1e-9;
+/// No segment becomes shorter than this share of its rest length.
+const SHORTEST: f64 = 1e-3;
+
 /// The region of the unknowns of `Chain`, and where random starts are drawn.
 #[derive(Clone, Debug)]
 pub(super) struct Reach {
@@ -87,93 +95,136 @@ pub(super) struct Reach {
     /// lead.
     pub(super) lower: Vec<f64>,
     pub(super) upper: Vec<f64>,
-    /// Largest angle \[rad\], shortest and longest length over the rest length, per segment.
-    pub(super) draws: Vec<(f64, f64, f64)>,
-    /// Freedoms of the arcs that the tendons have.
+    /// Per segment.
+    pub(super) draws: Vec<Draw>,
+    /// Freedoms that the tendons have and the bounds leave.
     pub(super) freedoms: usize,
+    /// Lowest and highest displacement of every tendon \[m\].
+    ranges: Vec<(f64, f64)>,
     /// What the bounds and the discs of the region hold back.
     labels: (Vec<String>, Vec<String>),
 }
 
+/// Where a segment's unknowns are drawn from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Draw {
+    /// Largest angle \[rad\].
+    pub(super) widest: f64,
+    /// Shortest and longest length over the rest length.
+    pub(super) shortest: f64,
+    pub(super) longest: f64,
+}
+
 impl Reach {
-    pub(super) fn new(plan: &Plan, bounds: &Bounds, tendons: usize) -> Result<Self, InvalidInput> {
-        let (width, count) = (plan.width(), plan.segment_count());
-        let size = width * count;
-        if let Some(range) = &bounds.displacement {
-            range.check("bounds.displacement", tendons, "tendon")?;
+    pub(super) fn new(
+        plan: &Plan,
+        bounds: &Bounds,
+        names: &[String],
+    ) -> Result<Self, InvalidInput> {
+        bounds.check(plan, names.len())?;
+        let (width, size) = (plan.width(), plan.width() * plan.segment_count());
+        let draws: Vec<Draw> = (0..plan.segment_count()).map(|i| bounds.draw(plan, i)).collect();
+        let ranges: Vec<_> = (0..names.len()).map(|k| bounds.displacements(plan, k)).collect();
+        let sides = draws.iter().flat_map(|draw| {
+            let widest = draw.widest.min(PI);
+            let sides = [(-widest, widest), (-widest, widest), (draw.shortest, draw.longest)];
+            sides.into_iter().take(width)
+        });
+        let (lower, upper) = sides.unzip();
+        let mut reach = Self {
+            region: Region::new(size),
+            lower,
+            upper,
+            draws,
+            freedoms: 0,
+            ranges,
+            labels: (Vec::new(), Vec::new()),
+        };
+        reach.equate(plan);
+        for i in 0..plan.segment_count() {
+            reach.bound_length(plan, bounds, i);
+            reach.bound_turn(plan, bounds, i);
         }
-        for (argument, range) in
-            [("bounds.curvature", &bounds.curvature), ("bounds.length", &bounds.length)]
-        {
-            range.as_ref().map_or(Ok(()), |r| r.check(argument, count, "segment"))?;
-        }
-        if width == 2 && bounds.length.is_some() {
-            let expected = "no bounds on length unless settings.extensible";
-            return Err(InvalidInput::new("bounds.length", expected, "bounds"));
-        }
-        if let Some(range) = &bounds.curvature
-            && (0..count).any(|i| range.at(i).0 > 0.0)
-        {
-            let expected = "no lower bounds above zero: a region with holes is none";
-            return Err(InvalidInput::new("bounds.curvature", expected, "one"));
-        }
-        if let Some(range) = &bounds.length
-            && (0..count).any(|i| range.at(i).1 <= 0.0)
-        {
-            let expected = "upper bounds above zero [m]";
-            return Err(InvalidInput::new("bounds.length", expected, "one that is not"));
-        }
-        let mut region = Region::new(size);
+        reach.bound_displacements(plan, names);
+        Ok(reach)
+    }
+
+    /// What is no freedom: directions that no tendon moves, straight segments, values held by equal bounds.
+    fn equate(&mut self, plan: &Plan) {
+        let (width, size) = (plan.width(), self.region.size());
+        let mut equations: Vec<(Vec<f64>, f64)> = Vec::new();
         for direction in plan.unmoved() {
             let normal: Vec<f64> = (0..size).map(|j| direction[j] * plan.unit(j)).collect();
             let at_rest = (0..size).map(|j| normal[j] * rest(plan, j)).sum();
-            region.equate(&normal, at_rest);
+            equations.push((normal, at_rest));
         }
-        let mut labels = (Vec::new(), Vec::new());
-        let mut draws = Vec::with_capacity(count);
-        for (i, segment) in plan.segments().enumerate() {
-            let rest = segment.rest_length;
-            let (shortest, longest) = match &bounds.length {
-                Some(range) => (range.at(i).0.max(1e-3 * rest) / rest, range.at(i).1 / rest),
-                None => STRETCH,
-            };
-            let curvature = bounds.curvature.as_ref().map_or(f64::INFINITY, |range| range.at(i).1);
-            let first = width * i;
-            let mut widest = TURN;
-            if width == 3 {
-                let mut normal = vec![0.0; size];
-                normal[first + 2] = 1.0;
-                if region.bound(&normal, longest) {
-                    labels.0.push(format!("longest segment {i}"));
-                }
-                normal[first + 2] = -1.0;
-                if region.bound(&normal, -shortest) {
-                    labels.0.push(format!("shortest segment {i}"));
-                }
-                if curvature < f64::INFINITY {
-                    let scale = Some(first + 2);
-                    region.add_disc(Disc { first, radius: curvature * rest, scale });
-                    labels.1.push(format!("curvature of segment {i}"));
-                }
-                widest = widest.min(curvature * rest * longest);
-                region.add_disc(Disc { first, radius: TURN, scale: None });
-                labels.1.push(format!("full turn of segment {i}"));
-            } else {
-                widest = widest.min(curvature * rest);
-                region.add_disc(Disc { first, radius: widest, scale: None });
-                let what = if widest < TURN { "curvature" } else { "full turn" };
-                labels.1.push(format!("{what} of segment {i}"));
+        for (i, draw) in self.draws.iter().enumerate() {
+            if draw.widest <= STRAIGHT {
+                equations.push((unit(size, width * i), 0.0));
+                equations.push((unit(size, width * i + 1), 0.0));
             }
-            // Without an upper bound, starts are drawn up to twice the default one.
-            draws.push((widest, shortest, longest.min(2.0 * STRETCH.1 * shortest.max(1.0))));
+            if width == 3 && draw.shortest == draw.longest {
+                equations.push((unit(size, width * i + 2), draw.longest));
+            }
         }
-        bound_displacements(plan, bounds, tendons, &mut region, &mut labels.0);
-        let sides = draws.iter().flat_map(|&(widest, shortest, longest)| {
-            let widest = widest.min(PI);
-            [(-widest, widest), (-widest, widest), (shortest, longest)].into_iter().take(width)
-        });
-        let (lower, upper) = sides.unzip();
-        Ok(Self { region, lower, upper, draws, freedoms: size - plan.unmoved().len(), labels })
+        for (k, (_, upper)) in self.ranges.iter().enumerate().filter(|(_, (l, u))| l == u) {
+            let (row, at_rest) = displacement(plan, k);
+            equations.push((row, upper + at_rest));
+        }
+        let matrix = DMatrix::from_fn(equations.len(), size, |row, j| equations[row].0[j]);
+        self.freedoms = null_space(&matrix).len();
+        for (normal, value) in &equations {
+            self.region.equate(normal, *value);
+        }
+    }
+
+    fn bound_length(&mut self, plan: &Plan, bounds: &Bounds, i: usize) {
+        let draw = self.draws[i];
+        if plan.width() == 2 || draw.shortest == draw.longest {
+            return;
+        }
+        let mut normal = unit(self.region.size(), 3 * i + 2);
+        if self.region.bound(&normal, bounds.longest(plan, i)) {
+            self.labels.0.push(format!("longest segment {i}"));
+        }
+        normal[3 * i + 2] = -1.0;
+        if self.region.bound(&normal, -draw.shortest) {
+            self.labels.0.push(format!("shortest segment {i}"));
+        }
+    }
+
+    fn bound_turn(&mut self, plan: &Plan, bounds: &Bounds, i: usize) {
+        let first = plan.width() * i;
+        if self.draws[i].widest <= STRAIGHT {
+            return;
+        }
+        let radius = bounds.largest_curvature(i) * plan.segment(i).rest_length;
+        let scale = (plan.width() == 3).then_some(first + 2);
+        // Without stretch the smaller of two circles is all there is.
+        if radius < if scale.is_some() { f64::INFINITY } else { TURN } {
+            self.region.add_disc(Disc { first, radius, scale });
+            self.labels.1.push(format!("curvature of segment {i}"));
+            if scale.is_none() {
+                return;
+            }
+        }
+        self.region.add_disc(Disc { first, radius: TURN, scale: None });
+        self.labels.1.push(format!("full turn of segment {i}"));
+    }
+
+    fn bound_displacements(&mut self, plan: &Plan, names: &[String]) {
+        for (k, (lower, upper)) in self.ranges.iter().enumerate().filter(|(_, (l, u))| l < u) {
+            let (mut row, at_rest) = displacement(plan, k);
+            if self.region.bound(&row, upper + at_rest) {
+                self.labels.0.push(format!("release of '{}'", names[k]));
+            }
+            for entry in &mut row {
+                *entry = -*entry;
+            }
+            if self.region.bound(&row, -lower - at_rest) {
+                self.labels.0.push(format!("pull of '{}'", names[k]));
+            }
+        }
     }
 
     /// The bounds that hold a point back.
@@ -182,6 +233,82 @@ impl Reach {
         let bounds = bounds.into_iter().map(|k| self.labels.0[k].as_str());
         bounds.chain(discs.into_iter().map(|k| self.labels.1[k].as_str())).collect()
     }
+
+    /// Writes the displacements of a point. Rounding leaves none outside its bounds: a released lone tendon
+    /// would leave its segment straight.
+    pub(super) fn write_displacements(&self, plan: &Plan, point: &[f64], place: &mut [f64]) {
+        for (k, displacement) in place.iter_mut().enumerate() {
+            let value = point
+                .iter()
+                .enumerate()
+                .fold(0.0, |sum, (j, value)| sum + plan.by_unknown(k, j) * (value - rest(plan, j)));
+            let (lower, upper) = self.ranges[k];
+            *displacement = value.max(lower).min(upper);
+        }
+    }
+}
+
+impl Bounds {
+    fn check(&self, plan: &Plan, tendons: usize) -> Result<(), InvalidInput> {
+        let count = plan.segment_count();
+        for (argument, range, count, per) in [
+            ("bounds.displacement", &self.displacement, tendons, "tendon"),
+            ("bounds.curvature", &self.curvature, count, "segment"),
+            ("bounds.length", &self.length, count, "segment"),
+        ] {
+            range.as_ref().map_or(Ok(()), |range| range.check(argument, count, per))?;
+        }
+        if let Some(range) = &self.curvature
+            && (0..count).any(|i| range.at(i).0 > 0.0)
+        {
+            let expected = "no lower bounds above zero: a region with holes is none";
+            return Err(InvalidInput::new("bounds.curvature", expected, "one"));
+        }
+        let Some(range) = &self.length else { return Ok(()) };
+        if plan.width() == 2 {
+            let expected = "no bounds on length unless settings.extensible";
+            return Err(InvalidInput::new("bounds.length", expected, "bounds"));
+        }
+        let short = (0..count).find(|i| range.at(*i).1 < SHORTEST * plan.segment(*i).rest_length);
+        short.map_or(Ok(()), |i| {
+            let least = SHORTEST * plan.segment(i).rest_length;
+            let expected = format!("upper bounds of {least} m or more for segment {i}");
+            Err(InvalidInput::new("bounds.length", expected, format!("{:?}", range.at(i).1)))
+        })
+    }
+
+    /// Largest curvature of a segment \[1/m\].
+    fn largest_curvature(&self, i: usize) -> f64 {
+        self.curvature.as_ref().map_or(f64::INFINITY, |range| range.at(i).1)
+    }
+
+    /// Longest length of a segment over its rest length.
+    fn longest(&self, plan: &Plan, i: usize) -> f64 {
+        let rest = plan.segment(i).rest_length;
+        self.length.as_ref().map_or(STRETCH.1, |range| range.at(i).1 / rest)
+    }
+
+    fn draw(&self, plan: &Plan, i: usize) -> Draw {
+        let rest = plan.segment(i).rest_length;
+        let (shortest, longest) = match &self.length {
+            Some(range) => ((range.at(i).0 / rest).max(SHORTEST), self.longest(plan, i)),
+            None if plan.width() == 3 => STRETCH,
+            None => (1.0, 1.0),
+        };
+        let widest = TURN.min(self.largest_curvature(i) * rest * longest);
+        // Without an upper bound, starts are drawn up to twice the default one.
+        let longest = longest.min(2.0 * STRETCH.1 * shortest.max(1.0));
+        Draw { widest, shortest, longest }
+    }
+
+    /// Lowest and highest displacement of a tendon \[m\].
+    fn displacements(&self, plan: &Plan, k: usize) -> (f64, f64) {
+        let free = (f64::NEG_INFINITY, f64::INFINITY);
+        let (lower, upper) = self.displacement.as_ref().map_or(free, |range| range.at(k));
+        // The only tendon of a segment cannot push: released, it does not count.
+        let lone = plan.segments().any(|segment| segment.own == [k]);
+        (lower, if lone { upper.min(0.0) } else { upper })
+    }
 }
 
 /// Value of an unknown at rest.
@@ -189,31 +316,16 @@ pub(super) fn rest(plan: &Plan, unknown: usize) -> f64 {
     if unknown % plan.width() == 2 { 1.0 } else { 0.0 }
 }
 
-fn bound_displacements(
-    plan: &Plan,
-    bounds: &Bounds,
-    tendons: usize,
-    region: &mut Region,
-    labels: &mut Vec<String>,
-) {
+fn unit(size: usize, k: usize) -> Vec<f64> {
+    let mut normal = vec![0.0; size];
+    normal[k] = 1.0;
+    normal
+}
+
+/// A tendon's displacement by the unknowns, and what that row is at rest.
+fn displacement(plan: &Plan, k: usize) -> (Vec<f64>, f64) {
     let size = plan.width() * plan.segment_count();
-    for k in 0..tendons {
-        let (lower, mut upper) =
-            bounds.displacement.as_ref().map_or((f64::NEG_INFINITY, f64::INFINITY), |r| r.at(k));
-        // The only tendon of a segment cannot push: released, it does not count.
-        if plan.segments().any(|segment| segment.own == [k]) {
-            upper = upper.min(0.0);
-        }
-        let mut row: Vec<f64> = (0..size).map(|j| plan.by_unknown(k, j)).collect();
-        let at_rest: f64 = (0..size).map(|j| row[j] * rest(plan, j)).sum();
-        if region.bound(&row, upper + at_rest) {
-            labels.push(format!("release of tendon {k}"));
-        }
-        for entry in &mut row {
-            *entry = -*entry;
-        }
-        if region.bound(&row, -lower - at_rest) {
-            labels.push(format!("pull of tendon {k}"));
-        }
-    }
+    let row: Vec<f64> = (0..size).map(|j| plan.by_unknown(k, j)).collect();
+    let at_rest = (0..size).map(|j| row[j] * rest(plan, j)).sum();
+    (row, at_rest)
 }

@@ -10,7 +10,7 @@ use crate::solve::fit::Problem;
 
 use super::{InverseSettings, Target};
 
-/// How much of the robot's length one radian counts, unless it is said.
+/// How much of the robot's length one radian counts, unless it is said; and all of the tool.
 const RADIAN: f64 = 0.3;
 
 /// Unknowns, base first: for every segment its bending vector \[rad\] and, if it is extensible, its length
@@ -21,7 +21,9 @@ pub(crate) struct Chain<'a> {
     plan: &'a Plan,
     target: Target,
     settings: &'a InverseSettings,
-    /// Weights of the residuals over the robot's length: position along world axes, rotation about tool
+    /// The base's rotation, where weights along world axes differ.
+    axes: Option<Matrix3<f64>>,
+    /// Weights of the residuals over the robot's reach: position along world axes, rotation about tool
     /// axes.
     weights: Vector6<f64>,
     /// Stiffness of every segment's bending vector, of mean 1.
@@ -43,9 +45,11 @@ pub(crate) struct Chain<'a> {
 
 impl<'a> Chain<'a> {
     pub(crate) fn new(robot: &'a Robot, plan: &'a Plan, settings: &'a InverseSettings) -> Self {
-        let length = robot.backbone().total_length();
-        let radian = settings.rotation_weight.map(|w| w.unwrap_or(RADIAN * length) / length);
-        let [x, y, z] = settings.position_weight.map(|w| w / length);
+        let tool = robot.tool().translation.norm();
+        let reach = robot.backbone().total_length() + tool;
+        let default = RADIAN * robot.backbone().total_length() + tool;
+        let radian = settings.rotation_weight.map(|w| w.unwrap_or(default) / reach);
+        let [x, y, z] = settings.position_weight.map(|w| w / reach);
         let count = plan.segments().len();
         let stiffness: Vec<f64> = plan.segments().map(|s| s.stiffness(robot)).collect();
         let mean = stiffness.iter().sum::<f64>() / count as f64;
@@ -54,6 +58,7 @@ impl<'a> Chain<'a> {
             plan,
             target: Target::Position(Vector3::zeros()),
             settings,
+            axes: (x != y || y != z).then(|| robot.base().rotation),
             weights: Vector6::new(x, y, z, radian[0], radian[1], radian[2]),
             stiffness: stiffness.iter().map(|s| s / mean).collect(),
             bents: Vec::with_capacity(count),
@@ -66,8 +71,25 @@ impl<'a> Chain<'a> {
         }
     }
 
+    /// Everything is in the frame of the base: the world's origin may be far away.
     pub(crate) fn aim(&mut self, target: Target) {
-        self.target = target;
+        let world = self.robot.base().inverse();
+        self.target = match target {
+            Target::Position(position) => {
+                let off = position - self.robot.base().translation;
+                Target::Position(world.rotation * off)
+            }
+            Target::Pose(pose) => {
+                let off = pose.translation - self.robot.base().translation;
+                let rotation = world.rotation * pose.rotation;
+                Target::Pose(Pose { rotation, translation: world.rotation * off })
+            }
+        };
+    }
+
+    /// A vector in the axes that its weights are for.
+    fn weighed(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        self.axes.map_or(*v, |axes| axes * v)
     }
 
     /// Number of residuals that count.
@@ -80,7 +102,7 @@ impl<'a> Chain<'a> {
     /// the axes that count; 0 for the angle to a position.
     pub(crate) fn misses(&self) -> (f64, f64) {
         let counts = |weight: f64, value: f64| if weight > 0.0 { value * value } else { 0.0 };
-        let off = self.target.position() - self.tool;
+        let off = self.weighed(&(self.target.position() - self.tool));
         let sum = |offset: usize, v: &Vector3<f64>| {
             (0..3).map(|k| counts(self.weights[offset + k], v[k])).sum::<f64>().sqrt()
         };
@@ -92,7 +114,7 @@ impl<'a> Chain<'a> {
         self.bents.clear();
         self.lengths.clear();
         self.frames.clear();
-        let mut frame = *self.robot.base();
+        let mut frame = Pose::identity();
         self.frames.push(frame);
         let width = self.plan.width();
         for (segment, q) in self.plan.segments().zip(z.chunks_exact(width)) {
@@ -114,7 +136,7 @@ impl<'a> Chain<'a> {
 
     /// Residuals of the last placing.
     fn residual(&self) -> Vector6<f64> {
-        let off = self.target.position() - self.tool;
+        let off = self.weighed(&(self.target.position() - self.tool));
         let turn = if self.target.rotation().is_some() { self.error } else { Vector3::zeros() };
         Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z).component_mul(&self.weights)
     }
@@ -164,8 +186,10 @@ impl Problem<6> for Chain<'_> {
         self.differentiate();
         *residual = self.residual();
         let rotates = self.target.rotation().is_some();
+        let axes = self.axes;
         for (column, (velocity, spin)) in jacobian.iter_mut().zip(&self.columns) {
             let turned = if rotates { self.back * spin } else { Vector3::zeros() };
+            let velocity = axes.map_or(*velocity, |axes| axes * velocity);
             for k in 0..3 {
                 column[k] = -self.weights[k] * velocity[k];
                 column[k + 3] = -self.weights[k + 3] * turned[k];
@@ -193,6 +217,7 @@ impl Problem<6> for Chain<'_> {
         let size = self.columns.len();
         let push = -weights.component_mul(&self.weights);
         let force: Vector3<f64> = push.fixed_rows::<3>(0).into();
+        let force = self.axes.map_or(force, |axes| axes.tr_mul(&force));
         let twist: Vector3<f64> = push.fixed_rows::<3>(3).into();
         let rotates = self.target.rotation().is_some();
         // In world axes, as `back` carries it.

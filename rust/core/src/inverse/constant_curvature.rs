@@ -7,11 +7,11 @@ use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::bounds::{Bounds, Reach, rest};
+use super::bounds::{Bounds, Draw, Reach};
 use super::chain::Chain;
 use super::search::{Effort, Found, Search};
 use super::{InverseSettings, Method, Target};
-use crate::constant_curvature::{Arc, Plan, displacements};
+use crate::constant_curvature::{Arc, Plan};
 use crate::error::InvalidInput;
 use crate::robot::Robot;
 use crate::solve::fit::Problem;
@@ -70,7 +70,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         settings: InverseSettings,
     ) -> Result<Self, InvalidInput> {
         settings.validate()?;
-        let reach = Reach::new(plan, bounds, robot.tendons().len())?;
+        let reach = Reach::new(plan, bounds, robot.tendon_names())?;
         Ok(Self { robot, plan, settings, reach })
     }
 
@@ -104,6 +104,11 @@ impl<'a> ConstantCurvatureInverse<'a> {
     ) -> Answer {
         work.chain.aim(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
+        let usable = |arcs: &&[Arc]| {
+            let sound = |arc: &Arc| arc.bend.amax() < FAR && arc.length.is_finite();
+            arcs.len() == self.plan.segment_count() && arcs.iter().all(sound)
+        };
+        let start = start.filter(usable);
         let given = usize::from(start.is_some());
         let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| match start {
             Some(arcs) if k == 0 => self.unknowns(arcs, point),
@@ -115,6 +120,9 @@ impl<'a> ConstantCurvatureInverse<'a> {
     /// Seeks again from where the last solve in `work` ended, as along a path; from other starts only when
     /// that fails.
     pub fn follow(&self, target: &Target, work: &mut Workspace<'_>) -> Answer {
+        if work.search.point.len() != self.reach.region.size() {
+            return self.solve(target, None, work);
+        }
         work.chain.aim(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
         let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| {
@@ -158,7 +166,10 @@ impl<'a> ConstantCurvatureInverse<'a> {
             }
             let energy = work.chain.energy(point, &mut slope);
             let answer = Self::answer(found, &work.chain);
-            let solution = Solution { arcs: self.arcs(work), energy, hits: 1, answer };
+            let mut displacements = vec![0.0; self.robot.tendons().len()];
+            self.write_displacements(work, &mut displacements);
+            let arcs = self.arcs(work);
+            let solution = Solution { arcs, displacements, energy, hits: 1, answer };
             distinct.push((point.clone(), solution));
         }
         distinct.sort_by(|(_, a), (_, b)| a.energy.total_cmp(&b.energy));
@@ -197,20 +208,15 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// The displacements that give the robot the arcs that the last solve in `work` found \[m\].
     pub fn write_displacements(&self, work: &Workspace<'_>, place: &mut [f64]) {
-        for (k, displacement) in place.iter_mut().enumerate() {
-            let unknowns = work.search.point.iter().enumerate();
-            *displacement = unknowns.fold(0.0, |sum, (j, value)| {
-                sum + self.plan.by_unknown(k, j) * (value - rest(self.plan, j))
-            });
-        }
+        self.reach.write_displacements(self.plan, &work.search.point, place);
     }
 
     /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
     #[must_use]
     pub fn message(&self, answer: &Answer, work: &Workspace<'_>) -> String {
         let Answer { distance, angle, .. } = *answer;
-        let angle = if angle > 0.0 { format!(" and {angle:.6} rad") } else { String::new() };
-        let off = format!("{distance:.6} m{angle} off the target");
+        let angle = if angle > 0.0 { format!(" and {angle:.2e} rad") } else { String::new() };
+        let off = format!("{distance:.2e} m{angle} off the target");
         let held = self.reach.holding(&work.search.point);
         let held = if held.is_empty() {
             String::new()
@@ -272,22 +278,22 @@ impl<'a> ConstantCurvatureInverse<'a> {
             }
         };
         let angle = bend.norm();
-        for (segment, (widest, shortest, longest)) in self.plan.segments().zip(&self.reach.draws) {
+        for (segment, draw) in self.plan.segments().zip(&self.reach.draws) {
             let share = segment.rest_length / rest;
-            let share = if angle * share > *widest { widest / angle } else { share };
+            let share = if angle * share > draw.widest { draw.widest / angle } else { share };
             point.extend_from_slice((bend * share).as_slice());
             if self.plan.width() == 3 {
-                point.push((length / rest).clamp(*shortest, *longest));
+                point.push((length / rest).clamp(draw.shortest, draw.longest));
             }
         }
     }
 
     fn nearly_straight(&self, point: &mut Vec<f64>) {
-        for (i, (_, shortest, longest)) in self.reach.draws.iter().enumerate() {
+        for (i, draw) in self.reach.draws.iter().enumerate() {
             let (sin, cos) = (2.4 * i as f64).sin_cos();
             point.extend([0.02 * cos, 0.02 * sin]);
             if self.plan.width() == 3 {
-                point.push(1.0_f64.clamp(*shortest, *longest));
+                point.push(1.0_f64.clamp(draw.shortest, draw.longest));
             }
         }
     }
@@ -295,9 +301,9 @@ impl<'a> ConstantCurvatureInverse<'a> {
     fn random(&self, k: usize, point: &mut Vec<f64>) {
         let mut draws = ChaCha8Rng::seed_from_u64(self.settings.seed);
         draws.set_stream(k as u64);
-        for (widest, shortest, longest) in &self.reach.draws {
+        for &Draw { widest, shortest, longest } in &self.reach.draws {
             // Segments seldom turn by more than half a turn: every other start looks no further.
-            let widest = if k.is_multiple_of(2) { widest.min(PI) } else { *widest };
+            let widest = if k.is_multiple_of(2) { widest.min(PI) } else { widest };
             let angle = widest * draws.random::<f64>();
             let (sin, cos) = (TAU * draws.random::<f64>()).sin_cos();
             point.extend([angle * cos, angle * sin]);
@@ -332,6 +338,9 @@ fn arc_to(point: &Vector3<f64>, tool: &Vector3<f64>, wanted: f64) -> (Vector2<f6
     if far.1 > 0.0 && (far.1 - wanted).abs() < (near.1 - wanted).abs() { far } else { near }
 }
 
+/// A start that turns further than this is none \[rad\].
+const FAR: f64 = 1e3;
+
 /// Unknowns that differ by more than this are other answers.
 const DISTINCT: f64 = 1e-6;
 
@@ -340,18 +349,12 @@ const DISTINCT: f64 = 1e-6;
 pub struct Solution {
     /// Its arcs, base first.
     pub arcs: Vec<Arc>,
+    /// Its displacements \[m\].
+    pub displacements: Vec<f64>,
     /// Its bending energy, in a unit common to the answers.
     pub energy: f64,
     /// How many starts led to it.
     pub hits: usize,
     /// How it ended.
     pub answer: Answer,
-}
-
-impl Solution {
-    /// Its displacements \[m\].
-    #[must_use]
-    pub fn displacements(&self, plan: &Plan) -> Vec<f64> {
-        displacements(plan, &self.arcs).iter().copied().collect()
-    }
 }

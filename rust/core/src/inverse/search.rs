@@ -91,7 +91,8 @@ impl Search<'_> {
                 self.settle(problem, reach, effort.swarm, k)
             };
             if !inside {
-                if tried == 0 {
+                // A start may be too far away to be brought back; the middle of the box is not.
+                if tried == 0 && !self.has_a_point(reach) {
                     return (Status::Infeasible, 1);
                 }
                 continue;
@@ -108,6 +109,13 @@ impl Search<'_> {
             return (status, effort.starts);
         }
         (self.nearest(problem, reach, effort), effort.starts)
+    }
+
+    /// Whether the region has a point, which is then at hand.
+    fn has_a_point(&mut self, reach: &Reach) -> bool {
+        self.point.clear();
+        self.point.extend(reach.lower.iter().zip(&reach.upper).map(|(l, u)| 0.5 * (l + u)));
+        self.fit.restore(&reach.region, &mut self.point)
     }
 
     /// Descends from the point at hand: the status if it meets the target.

@@ -72,8 +72,11 @@ impl<const R: usize> Workspace<R> {
         problem.evaluate(z, &mut self.residual, &mut self.jacobian);
         for _ in 0..max_iterations {
             self.iterations += 1;
-            if !self.energy_model(problem, region, z, &least.gradient, &pull, &mut damping) {
-                return Ending::Failed;
+            match self.energy_model(problem, region, z, &least.gradient, &pull, &mut damping) {
+                Outcome::Solved => {}
+                // Bounds and target agree at this point alone: there is no freedom to spend.
+                Outcome::Infeasible if problem.met(&self.residual) => return Ending::Met,
+                Outcome::Infeasible | Outcome::Failed => return Ending::Failed,
             }
             pull.fill(0.0);
             for (&row, multiplier) in self.program.active.iter().zip(&self.program.multipliers) {
@@ -155,7 +158,7 @@ impl<const R: usize> Workspace<R> {
         gradient: &[f64],
         pull: &SVector<f64, R>,
         damping: &mut f64,
-    ) -> bool {
+    ) -> Outcome {
         let size = region.size();
         self.hessian.clear();
         self.hessian.resize(size * size, 0.0);
@@ -183,11 +186,11 @@ impl<const R: usize> Workspace<R> {
             // Little more than it takes: steps along negative curvature should be long.
             *damping = (2.0 * *damping).max(DAMPING.0);
             if *damping > DAMPING.1 {
-                return false;
+                return Outcome::Failed;
             }
         }
         self.program.gradient.clear();
         self.program.gradient.extend_from_slice(gradient);
-        self.program.solve(&self.rows) == Outcome::Solved
+        self.program.solve(&self.rows)
     }
 }
