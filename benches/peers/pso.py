@@ -1,7 +1,8 @@
 """Particle swarms side by side: tdcr, pyswarms and scipy's differential evolution in one run.
 
-The first rows are what a user of tdcr calls: `PlanarTrunk.inverse(x, y, method="pso")`, objective and
-polish in Rust, from Python and with its defaults; its answers are held against the same numpy function.
+The first rows are what a user of tdcr calls: `PlanarTrunk.inverse(x, y, method="pso")`, objective
+and polish in Rust, called from Python; its answers are held against the same numpy function, in its
+time.
 Ratios are against the first row.
 
 The inverse of Mahfoudi, Amouri & Zaatri's planar trunk: sections of 140 and 120 mm, the path
