@@ -208,11 +208,15 @@ class Swarm:
     restarts: int = 10
     callback: Callable[[int, float], object] | None = None
 
+    @property
+    def among(self) -> bool:
+        """Whether there are obstacles; what has no length is for the core to refuse."""
+        return not isinstance(self.obstacles, Sized) or len(self.obstacles) > 0
+
     def refuse(self) -> None:
         """Refuse what method "newton" has no use for."""
-        # An array has no truth, but a length.
         given = {
-            "obstacles": np.size(self.obstacles) > 0,
+            "obstacles": self.among,
             "objective": self.objective != "bends",
             "settings": self.settings is not None,
             "seed": self.seed is not None,
@@ -231,8 +235,7 @@ class Swarm:
     def chosen(self) -> PsoSettings:
         """Return the swarm's settings, the seed apart: among obstacles a ring by default."""
         if self.settings is None:
-            ring = np.size(self.obstacles) > 0
-            return PsoSettings(topology="ring") if ring else PsoSettings()
+            return PsoSettings(topology="ring") if self.among else PsoSettings()
         if not isinstance(self.settings, PsoSettings):
             raise TypeError(f"settings: expected PsoSettings, got {type(self.settings).__name__}")
         return self.settings
@@ -279,18 +282,17 @@ def one(
 ) -> PlanarInverse:
     """Solve one target (x, y, heading); newton is (tolerance, max_iterations, starts)."""
     _check(method, newton[2], swarm)
-    limits = np.atleast_1d(np.asarray(limit))
     (x, y, heading), (tolerance, max_iterations, starts) = target, newton
     if method == "newton":
         answer = _core._planar_newton(
-            *trunk._given, x, y, heading, limits, tolerance, max_iterations, starts
+            *trunk._given, x, y, heading, limit, tolerance, max_iterations, starts
         )
         return PlanarInverse(trunk=trunk, method=method, **answer)
     settings = swarm.chosen()
     if swarm.seed is not None:
         settings = settings.replace(seed=swarm.seed)
     keywords = swarm.keywords(settings, tolerance, max_iterations)
-    answer = _core._planar_swarm(*trunk._given, x, y, heading, limits, keywords, swarm.callback)
+    answer = _core._planar_swarm(*trunk._given, x, y, heading, limit, keywords, swarm.callback)
     del answer["seed"]
     return PlanarInverse(
         trunk=trunk, method=method, settings=settings, objective=swarm.objective, **answer
@@ -310,10 +312,8 @@ def many(
 ) -> PlanarInverseBatch:
     """Solve many targets."""
     _check(method, newton[2], swarm)
-    limits = np.atleast_1d(np.asarray(limit))
-    headings = None if heading is None else np.atleast_1d(np.asarray(heading))
     settings, objective = None, None
-    goals = (*trunk._given, points, headings, limits)
+    goals = (*trunk._given, points, heading, limit)
     total = len(points) if isinstance(points, Sized) else None
     with told(progress, "inverse_batch", total) as tell:
         if method == "newton":

@@ -1,5 +1,6 @@
 """The planar inverse by particle swarm, and batches of it, from Python."""
 
+import pickle
 import signal
 import subprocess
 import sys
@@ -127,6 +128,17 @@ def test_polish_can_be_switched_off():
     assert "after 1 swarms" in rough.message
 
 
+def test_results_are_values_of_their_own():
+    found = TWO.inverse(*PATH[4], method="pso")
+    twin = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(twin.turns, found.turns)
+    assert (twin.status, twin.settings, twin.trunk) == (found.status, found.settings, TWO)
+    batch = TWO.inverse_batch(PATH, method="pso")
+    for array in (found.turns, found.history, batch.turns, batch.points, batch.seed):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+
+
 def test_callbacks():
     seen = []
     found = TWO.inverse(
@@ -212,6 +224,9 @@ def batch(**options):
         ("obstacles", lambda: swarm(objective="points", obstacles=CIRCLE)),
         ("obstacles", lambda: swarm(obstacles=(0.1, 0.04, 0.02))),
         ("obstacles", lambda: swarm(obstacles=[(0.1, 0.04)])),
+        ("obstacles", lambda: swarm(obstacles=[(0.1, 0.04, 0.02), (0.1,)])),
+        ("limit", lambda: swarm(limit=[[1.0], [1.0, 2.0]])),
+        ("heading", lambda: batch(heading=[[1.0], [1.0, 2.0]])),
         ("obstacles[1].radius", lambda: swarm(obstacles=[*CIRCLE, (0.0, 0.1, 0.0)])),
         ("obstacles[0].y", lambda: swarm(obstacles=[(0.0, np.nan, 0.1)])),
         ("obstacles[0].x", lambda: TWO.shape([0, 0]).clearance([(np.inf, 0.0, 0.1)])),
@@ -256,6 +271,7 @@ def test_newton_says_who_knows_obstacles():
         lambda: swarm(objective=None),
         lambda: swarm(tolerance=None),
         lambda: swarm(obstacles="circle"),
+        lambda: swarm(obstacles=object()),
         lambda: batch(seed=["a"]),
         lambda: batch(progress=None, threads=1.5),
     ],

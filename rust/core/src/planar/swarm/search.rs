@@ -21,6 +21,21 @@ pub enum Word {
 }
 
 /// The inverse of a trunk among circles by swarm, with its memory for any number of goals.
+///
+/// ```
+/// use nalgebra::Vector2;
+/// use tdcr::planar::{Circle, Goal, SwarmSettings, SwarmSolver, Trunk, Word};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let trunk = Trunk::new(vec![0.14, 0.12], 0.03)?;
+/// let circles = [Circle::new(0.12, 0.08, 0.02)?];
+/// let mut solver = SwarmSolver::new(&trunk, &circles, &SwarmSettings::default())?;
+/// let goal = Goal { point: Vector2::new(0.2, 0.06), heading: None, limits: vec![3.0] };
+/// let found = solver.solve(&goal, 0, &mut |_| Word::GoOn)?;
+/// assert!(found.is_some_and(|found| found.inverse.error < 1e-12 && found.clearance >= 0.0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct SwarmSolver<'a> {
     trunk: &'a Trunk,
