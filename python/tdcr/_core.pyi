@@ -362,6 +362,8 @@ class InverseSettings:
         starts: int = 200,
         max_iterations: int = 50,
         seed: int = 0,
+        least_energy: bool = True,
+        swarm: PsoSettings | None = None,
     ) -> Self: ...
     @property
     def position_tolerance(self) -> float: ...
@@ -377,6 +379,10 @@ class InverseSettings:
     def max_iterations(self) -> int: ...
     @property
     def seed(self) -> int: ...
+    @property
+    def least_energy(self) -> bool: ...
+    @property
+    def swarm(self) -> PsoSettings | None: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -415,6 +421,7 @@ def _inverse(
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
     settings: LinkageSettings | ConstantCurvatureSettings | None,
     search: InverseSettings | None,
+    method: str,
 ) -> tuple[_Array, Status, str, float, float, int, int]: ...
 def _inverse_solutions(
     robot: Robot,
@@ -423,6 +430,7 @@ def _inverse_solutions(
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
     settings: LinkageSettings | ConstantCurvatureSettings | None,
     search: InverseSettings | None,
+    method: str,
 ) -> list[tuple[tuple[_Array, Status, str, float, float, int, int], int]]: ...
 def _inverse_batch(
     robot: Robot,
@@ -433,6 +441,7 @@ def _inverse_batch(
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
     settings: LinkageSettings | ConstantCurvatureSettings | None,
     search: InverseSettings | None,
+    method: str,
     threads: int | None,
     progress: Callable[[int], object] | None,
     chain: bool,

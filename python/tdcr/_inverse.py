@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     Settings: TypeAlias = LinkageSettings | ConstantCurvatureSettings
     BoundsLike: TypeAlias = Bounds | tuple[ArrayLike, ArrayLike]
     Array: TypeAlias = NDArray[np.float64]
+    Method: TypeAlias = Literal["newton", "pso"]
 
 __all__ = [
     "Inverse",
@@ -61,6 +62,7 @@ class Inverse:
     settings: Settings | None
     bounds: BoundsLike | None
     search: InverseSettings
+    method: Method
     hits: int = 1
     """How many starts led to this answer (`inverse_solutions`)."""
 
@@ -87,7 +89,8 @@ class Inverse:
         if not isinstance(other, Inverse):
             return NotImplemented
         mine, theirs = (
-            (a.robot, a.status, a.model, a.settings, a.search, a.hits) for a in (self, other)
+            (a.robot, a.status, a.model, a.settings, a.search, a.method, a.hits)
+            for a in (self, other)
         )
         return (
             mine == theirs
@@ -136,6 +139,7 @@ class InverseBatch(Sequence[Inverse]):
     settings: Settings | None
     bounds: BoundsLike | None
     search: InverseSettings
+    method: Method
 
     def __len__(self) -> int:
         """Return the number of targets B."""
@@ -162,6 +166,7 @@ class InverseBatch(Sequence[Inverse]):
             self.settings,
             self.bounds,
             self.search,
+            self.method,
         )
 
     def __repr__(self) -> str:
@@ -176,6 +181,7 @@ def inverse(
     *,
     model: str,
     start: ArrayLike | Inverse | Shape | None = None,
+    method: Method = "newton",
     bounds: BoundsLike | None = None,
     settings: Settings | None = None,
     search: InverseSettings | None = None,
@@ -192,6 +198,9 @@ def inverse(
     target : array_like, shape (3,) or (4, 4)
         Where the tool (``robot.tool``) should be, world frame [m]: a position, or a frame.
     model : {"constant_curvature"}
+    method : {"newton", "pso"}, optional
+        "newton" descends from guessed and random starts, and from where a swarm settles as the last
+        resort; "pso" from where particle swarms settle.
     start : array_like of shape (K,), Inverse or Shape, optional
         Displacements to try first, as along a path [m].
     bounds : Bounds or (lower, upper), optional
@@ -223,8 +232,10 @@ def inverse(
     (<Status.converged: 'converged'>, [-2.0, -2.0, 4.0])
     """
     search = InverseSettings() if search is None else search
-    row = _core._inverse(robot, target, model, _displacements(start), bounds, settings, search)
-    return Inverse(robot, _frozen(target), *row, model, settings, bounds, search)
+    row = _core._inverse(
+        robot, target, model, _displacements(start), bounds, settings, search, method
+    )
+    return Inverse(robot, _frozen(target), *row, model, settings, bounds, search, method)
 
 
 def inverse_solutions(
@@ -232,6 +243,7 @@ def inverse_solutions(
     target: ArrayLike,
     *,
     model: str,
+    method: Method = "newton",
     bounds: BoundsLike | None = None,
     settings: Settings | None = None,
     search: InverseSettings | None = None,
@@ -244,7 +256,7 @@ def inverse_solutions(
 
     Parameters
     ----------
-    robot, target, model, bounds, settings, search
+    robot, target, model, method, bounds, settings, search
         As for `inverse`.
 
     Returns
@@ -253,10 +265,11 @@ def inverse_solutions(
         Empty when none meets the target.
     """
     search = InverseSettings() if search is None else search
-    rows = _core._inverse_solutions(robot, target, model, bounds, settings, search)
+    rows = _core._inverse_solutions(robot, target, model, bounds, settings, search, method)
     fixed = _frozen(target)
     return [
-        Inverse(robot, fixed, *row, model, settings, bounds, search, hits) for row, hits in rows
+        Inverse(robot, fixed, *row, model, settings, bounds, search, method, hits)
+        for row, hits in rows
     ]
 
 
@@ -266,6 +279,7 @@ def inverse_batch(
     *,
     model: str,
     start: ArrayLike | None = None,
+    method: Method = "newton",
     bounds: BoundsLike | None = None,
     settings: Settings | None = None,
     search: InverseSettings | None = None,
@@ -276,7 +290,7 @@ def inverse_batch(
 
     Parameters
     ----------
-    robot, model, bounds, settings, search
+    robot, model, method, bounds, settings, search
         As for `inverse`.
     targets : array_like, shape (B, 3) or (B, 4, 4)
         One target per row [m].
@@ -300,7 +314,7 @@ def inverse_batch(
     KeyboardInterrupt
         On Ctrl-C, within about 0.1 s.
     """
-    options = {"start": start, "threads": threads, "chain": False}
+    options = {"start": start, "threads": threads, "chain": False, "method": method}
     return _many(robot, targets, model, bounds, settings, search, progress, options)
 
 
@@ -340,7 +354,12 @@ def track(
     InvalidInput, KeyboardInterrupt
         As `inverse_batch`.
     """
-    options = {"start": _displacements(start), "threads": None, "chain": True}
+    options = {
+        "start": _displacements(start),
+        "threads": None,
+        "chain": True,
+        "method": "newton",
+    }
     return _many(robot, targets, model, bounds, settings, search, progress, options)
 
 
@@ -375,6 +394,7 @@ def _many(
         settings=settings,
         bounds=bounds,
         search=search,
+        method=options["method"],
     )
 
 

@@ -221,6 +221,52 @@ def test_a_path_is_followed_without_jumps():
     assert np.abs(np.diff(batch.displacements, axis=0)).max() < 1e-4
 
 
+def test_a_path_with_freedom_may_stay_near_itself():
+    robot = trunk()
+    settings = tdcr.ConstantCurvatureSettings(extensible=True)
+    bounds = Bounds(length=([0.05, 0.05, 0.05], 0.08))
+    t = np.linspace(0, 1, 500)[:, None]
+    along = 0.6 * (rows(1, seed=5) * (1 - t) + rows(1, seed=6) * t)
+    path = tips(robot, along, settings=settings)
+    search = InverseSettings(least_energy=False)
+    batch = tdcr.track(
+        robot, path, model=MODEL, start=along[0], settings=settings, bounds=bounds, search=search
+    )
+    assert batch.ok.all()
+    assert (batch.starts == 1).all()
+    # The path was made with steps of 0.02 mm at most.
+    assert np.abs(np.diff(batch.displacements, axis=0)).max() < 1e-4
+
+
+def test_swarms_meet_positions_and_frames(placed):
+    robot, targets = placed
+    for aims in (targets, targets[:, :3, 3]):
+        batch = tdcr.inverse_batch(robot, aims, model=MODEL, method="pso")
+        assert batch.ok.all()
+        assert batch.error.max() < 1e-9
+        assert batch.rotation_error.max() < 1e-9
+        assert batch[0] == tdcr.inverse(robot, aims[0], model=MODEL, method="pso")
+    again = tdcr.inverse_batch(robot, targets, model=MODEL, method="pso", threads=2)
+    one = tdcr.inverse_batch(robot, targets, model=MODEL, method="pso", threads=1)
+    assert one.displacements.tobytes() == again.displacements.tobytes()
+    assert (one[0].method, one[0].search.seed) == ("pso", 0)
+
+
+def test_swarms_keep_bounds_and_their_settings():
+    robot = finger()
+    swarm = tdcr.PsoSettings(particles=12, max_iterations=50)
+    search = InverseSettings(swarm=swarm, starts=3)
+    bounds = Bounds(displacement=(-0.003, np.inf))
+    held = tdcr.inverse(
+        robot, [0.05, 0.0, 0.08], model=MODEL, method="pso", bounds=bounds, search=search
+    )
+    assert held.status is Status.unreachable
+    assert held.displacements.min() == pytest.approx(-0.003, abs=1e-12)
+    newton = tdcr.inverse(robot, [0.05, 0.0, 0.08], model=MODEL, bounds=bounds)
+    assert held.error == pytest.approx(newton.error, abs=1e-9)
+    assert held.search.swarm == swarm
+
+
 def test_a_start_may_be_a_shape_or_an_answer(placed):
     robot, targets = placed
     answer = tdcr.inverse(robot, targets[0], model=MODEL)
@@ -264,12 +310,17 @@ def test_results_are_values(placed):
         InverseSettings(),
         InverseSettings(position_weight=(1, 1, 0), rotation_weight=0.05, starts=7, seed=3),
         InverseSettings(rotation_weight=(1.0, 1.0, 0.0)),
+        InverseSettings(least_energy=False, swarm=tdcr.PsoSettings(particles=7)),
     ],
 )
 def test_bounds_and_settings_are_values(value):
     assert pickle.loads(pickle.dumps(value)) == value
     assert hash(pickle.loads(pickle.dumps(value))) == hash(value)
-    names = {"Bounds": Bounds, "InverseSettings": InverseSettings}
+    names = {
+        "Bounds": Bounds,
+        "InverseSettings": InverseSettings,
+        "PsoSettings": tdcr.PsoSettings,
+    }
     if "..." not in repr(value):
         assert repr(eval(repr(value), names)) == repr(value)
 
@@ -293,6 +344,7 @@ NAN[0, 3] = np.nan
         ("target", 2 * np.eye(4), {}),
         ("model", [0, 0, 0.1], {"model": "linkage"}),
         ("model", [0, 0, 0.1], {"model": "magic"}),
+        ("method", [0, 0, 0.1], {"method": "magic"}),
         ("settings", [0, 0, 0.1], {"settings": tdcr.LinkageSettings()}),
         ("start", [0, 0, 0.1], {"start": [0.0, 0.0]}),
         ("start", [0, 0, 0.1], {"start": [0.0, 0.0, np.nan]}),

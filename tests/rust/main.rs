@@ -10,11 +10,15 @@
 mod batch;
 mod common;
 mod constant_curvature;
+mod inverse;
+mod inverse_bounds;
+mod inverse_common;
 mod lie;
 mod linkage_bars;
 mod linkage_chain;
 mod linkage_drive;
 mod linkage_random;
+mod optimality;
 mod planar_inverse;
 mod planar_obstacles;
 mod planar_swarm;
@@ -23,6 +27,9 @@ mod planar_two_section;
 mod pso;
 mod pso_rates;
 mod robot;
+mod rod_golden;
+mod solve;
+mod solve_quadratic;
 
 /// Every file beside this one is a module of this target: a forgotten one would never run.
 #[test]

@@ -36,6 +36,7 @@ pub mod linkage;
 pub mod model;
 pub mod planar;
 pub mod robot;
+pub mod rod;
 mod shape;
 pub mod solve;
 mod status;

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use tdcr::batch::pool;
 use tdcr::constant_curvature::{Arc, ConstantCurvature, Plan, Workspace};
 use tdcr::inverse::{
-    Answer, ConstantCurvatureInverse, InverseRows, Target, invert_path, invert_rows,
+    Answer, ConstantCurvatureInverse, InverseRows, Method, Target, invert_path, invert_rows,
 };
 use tdcr::model::Model;
 use tdcr::robot::rigid_motion;
@@ -82,13 +82,19 @@ impl<'a> Problem<'a> {
         settings: Option<&Bound<'_, PyAny>>,
         bounds: Option<&Bound<'_, PyAny>>,
         search: Option<&Bound<'_, InverseSettings>>,
+        method: &str,
     ) -> PyResult<Self> {
         let Choice::ConstantCurvature(settings) = Choice::new(model, settings)? else {
             let expected = "a model with an inverse (\"constant_curvature\")";
             return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
         };
         let bounds = Bounds::extract(bounds)?;
-        let search = search.map_or_else(Default::default, |search| search.get().0);
+        let mut search = search.map_or_else(Default::default, |search| search.get().0);
+        let Some(method) = Method::ALL.into_iter().find(|known| known.as_str() == method) else {
+            let got = format!("\"{method}\"");
+            return Err(invalid(&InvalidInput::new("method", "\"newton\" or \"pso\"", got)));
+        };
+        search.method = method;
         let plan = robot.get().constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
         let robot: &tdcr::robot::Robot = &robot.get().0;
         let inverse = ConstantCurvatureInverse::new(robot, plan, &bounds, search);
@@ -165,8 +171,9 @@ pub(crate) fn _inverse(
     bounds: Option<&Bound<'_, PyAny>>,
     settings: Option<&Bound<'_, PyAny>>,
     search: Option<&Bound<'_, InverseSettings>>,
+    method: &str,
 ) -> PyResult<Row> {
-    let problem = Problem::new(robot, model, settings, bounds, search)?;
+    let problem = Problem::new(robot, model, settings, bounds, search, method)?;
     let target = one_target(target)?;
     let start = problem.one_start(start)?;
     let inverse = &problem.inverse;
@@ -186,6 +193,7 @@ pub(crate) fn _inverse(
 
 /// All answers of one target, least bending energy first, each with the number of starts that led there.
 #[pyfunction]
+#[allow(clippy::too_many_arguments)] // The keywords of inverse_solutions.
 pub(crate) fn _inverse_solutions(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
@@ -194,8 +202,9 @@ pub(crate) fn _inverse_solutions(
     bounds: Option<&Bound<'_, PyAny>>,
     settings: Option<&Bound<'_, PyAny>>,
     search: Option<&Bound<'_, InverseSettings>>,
+    method: &str,
 ) -> PyResult<Vec<(Row, usize)>> {
-    let problem = Problem::new(robot, model, settings, bounds, search)?;
+    let problem = Problem::new(robot, model, settings, bounds, search, method)?;
     let target = one_target(target)?;
     let inverse = &problem.inverse;
     let solutions = long_call::run(py, None, |control| {
@@ -210,7 +219,7 @@ pub(crate) fn _inverse_solutions(
 
 /// Columns of many inverses, each alone (`chain` false) or from the answer of the one before.
 #[pyfunction]
-#[pyo3(signature = (robot, targets, *, model, start, bounds, settings, search, threads, progress, chain))]
+#[pyo3(signature = (robot, targets, *, model, start, bounds, settings, search, method, threads, progress, chain))]
 #[allow(clippy::too_many_arguments)] // The keywords of inverse_batch and track.
 pub(crate) fn _inverse_batch<'py>(
     py: Python<'py>,
@@ -221,11 +230,12 @@ pub(crate) fn _inverse_batch<'py>(
     bounds: Option<&Bound<'py, PyAny>>,
     settings: Option<&Bound<'py, PyAny>>,
     search: Option<&Bound<'py, InverseSettings>>,
+    method: &str,
     threads: Option<&Bound<'py, PyAny>>,
     progress: Option<&Bound<'py, PyAny>>,
     chain: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let problem = Problem::new(robot, model, settings, bounds, search)?;
+    let problem = Problem::new(robot, model, settings, bounds, search, method)?;
     let targets = many_targets(targets)?;
     let inverse = &problem.inverse;
     let answers = if chain {

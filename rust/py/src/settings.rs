@@ -11,7 +11,7 @@ use tdcr::solve::pso::PsoSettings;
 
 use crate::arguments::{OneOrMany, number, whole};
 use crate::convert::{invalid, one_or_tuple};
-use crate::pso_settings;
+use crate::pso_settings::{self, PsoSettings as PyPsoSettings};
 
 /// How precisely and how long the linkage model solves each subsegment.
 ///
@@ -175,6 +175,13 @@ impl ConstantCurvatureSettings {
 ///     Steps per start at most.
 /// seed : int, optional
 ///     Of the random starts. The same seed gives the same answer on any number of threads.
+/// least_energy : bool, optional
+///     Whether freedom that the target leaves goes to the least bending energy. False keeps the answer
+///     near its start: a path then has no jumps where a least energy ends at a bound.
+/// swarm : PsoSettings, optional
+///     The swarms of method "pso" and of the last resort, their seeds counted from its own. They
+///     minimise the squared weighted miss over the robot's length. Default: 30 particles that hand
+///     over to descents at 1 % of the robot's length, or when they stagnate.
 ///
 /// Raises
 /// ------
@@ -212,10 +219,12 @@ impl InverseSettings {
     #[new]
     #[pyo3(
         signature = (*, position_tolerance=1e-10, rotation_tolerance=1e-10, position_weight=[1.0; 3],
-            rotation_weight=None, starts=200, max_iterations=50, seed=0),
+            rotation_weight=None, starts=200, max_iterations=50, seed=0, least_energy=true, swarm=None),
         text_signature = "(*, position_tolerance=1e-10, rotation_tolerance=1e-10, \
-            position_weight=1.0, rotation_weight=None, starts=200, max_iterations=50, seed=0)"
+            position_weight=1.0, rotation_weight=None, starts=200, max_iterations=50, seed=0, \
+            least_energy=True, swarm=None)"
     )]
+    #[allow(clippy::too_many_arguments)] // Keywords.
     fn new(
         position_tolerance: f64,
         rotation_tolerance: f64,
@@ -224,6 +233,8 @@ impl InverseSettings {
         #[pyo3(from_py_with = starts)] starts: usize,
         #[pyo3(from_py_with = max_iterations)] max_iterations: usize,
         #[pyo3(from_py_with = seed)] seed: u64,
+        least_energy: bool,
+        swarm: Option<PyRef<'_, PyPsoSettings>>,
     ) -> PyResult<Self> {
         let mut settings = inverse::InverseSettings {
             position_tolerance,
@@ -232,8 +243,12 @@ impl InverseSettings {
             starts,
             max_iterations,
             seed,
+            least_energy,
             ..Default::default()
         };
+        if let Some(swarm) = swarm {
+            settings.swarm = swarm.0;
+        }
         if let Some(weight) = rotation_weight {
             settings.rotation_weight = per_axis("rotation_weight", weight)?.map(Some);
         }
@@ -284,6 +299,19 @@ impl InverseSettings {
         self.0.seed
     }
 
+    /// Whether freedom goes to the least bending energy.
+    #[getter]
+    fn least_energy(&self) -> bool {
+        self.0.least_energy
+    }
+
+    /// The swarms, or None for the default.
+    #[getter]
+    fn swarm(&self) -> Option<PyPsoSettings> {
+        let default = inverse::InverseSettings::default().swarm;
+        (self.0.swarm != default).then_some(PyPsoSettings(self.0.swarm))
+    }
+
     fn __hash__(&self) -> u64 {
         let settings = &self.0;
         let weights = settings.rotation_weight.into_iter().flatten();
@@ -317,6 +345,8 @@ impl InverseSettings {
         keywords.set_item("starts", self.starts())?;
         keywords.set_item("max_iterations", self.max_iterations())?;
         keywords.set_item("seed", self.seed())?;
+        keywords.set_item("least_energy", self.least_energy())?;
+        keywords.set_item("swarm", self.swarm())?;
         Ok((PyTuple::empty(py), keywords))
     }
 }

@@ -116,3 +116,32 @@ impl Bent {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Straight, tiny, around both switches of the series, beyond a turn; in any direction.
+    #[test]
+    fn second_derivatives_agree_with_differences() {
+        let h = 1e-5;
+        for angle in [0.0, 1e-9, 1e-3, 0.4999, 0.5001, 1.0, 3.0, 3.4999, 3.5001, 5.0, 6.2, 9.0] {
+            for k in 0..12 {
+                let (sin, cos) = (0.1 + 0.55 * f64::from(k)).sin_cos();
+                let bend = Vector2::new(angle * cos, angle * sin);
+                let second = Bent::new(bend).second();
+                for j in 0..2 {
+                    let mut step = Vector2::zeros();
+                    step[j] = h;
+                    let (up, down) = (Bent::new(bend + step), Bent::new(bend - step));
+                    for i in 0..2 {
+                        let moved = (up.moved()[i] - down.moved()[i]) / (2.0 * h);
+                        let turned = (up.turned()[i] - down.turned()[i]) / (2.0 * h);
+                        assert!((second.end[i + j] - moved).amax() < 1e-9, "{angle} {k}");
+                        assert!((second.turned[i][j] - turned).amax() < 1e-9, "{angle} {k}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,5 +1,7 @@
 //! What an inverse may use, and the region of unknowns it leaves.
 
+use std::f64::consts::{PI, TAU};
+
 use crate::constant_curvature::Plan;
 use crate::error::InvalidInput;
 use crate::solve::region::{Disc, Region};
@@ -73,7 +75,7 @@ pub struct Bounds {
 }
 
 /// No segment turns further \[rad\]: beyond one turn an arc runs through itself.
-const TURN: f64 = std::f64::consts::TAU;
+const TURN: f64 = TAU;
 /// Shortest and longest segment over its rest length, unless bounds say otherwise.
 const STRETCH: (f64, f64) = (0.5, 2.0);
 
@@ -81,6 +83,10 @@ const STRETCH: (f64, f64) = (0.5, 2.0);
 #[derive(Clone, Debug)]
 pub(super) struct Reach {
     pub(super) region: Region,
+    /// The box of swarms: that of the region, but for turns beyond half a one, to which descents may
+    /// lead.
+    pub(super) lower: Vec<f64>,
+    pub(super) upper: Vec<f64>,
     /// Largest angle \[rad\], shortest and longest length over the rest length, per segment.
     pub(super) draws: Vec<(f64, f64, f64)>,
     /// Freedoms of the arcs that the tendons have.
@@ -104,6 +110,12 @@ impl Reach {
         if width == 2 && bounds.length.is_some() {
             let expected = "no bounds on length unless settings.extensible";
             return Err(InvalidInput::new("bounds.length", expected, "bounds"));
+        }
+        if let Some(range) = &bounds.curvature
+            && (0..count).any(|i| range.at(i).0 > 0.0)
+        {
+            let expected = "no lower bounds above zero: a region with holes is none";
+            return Err(InvalidInput::new("bounds.curvature", expected, "one"));
         }
         if let Some(range) = &bounds.length
             && (0..count).any(|i| range.at(i).1 <= 0.0)
@@ -156,7 +168,12 @@ impl Reach {
             draws.push((widest, shortest, longest.min(2.0 * STRETCH.1 * shortest.max(1.0))));
         }
         bound_displacements(plan, bounds, tendons, &mut region, &mut labels.0);
-        Ok(Self { region, draws, freedoms: size - plan.unmoved().len(), labels })
+        let sides = draws.iter().flat_map(|&(widest, shortest, longest)| {
+            let widest = widest.min(PI);
+            [(-widest, widest), (-widest, widest), (shortest, longest)].into_iter().take(width)
+        });
+        let (lower, upper) = sides.unzip();
+        Ok(Self { region, lower, upper, draws, freedoms: size - plan.unmoved().len(), labels })
     }
 
     /// The bounds that hold a point back.

@@ -112,6 +112,13 @@ impl<'a> Chain<'a> {
         }
     }
 
+    /// Residuals of the last placing.
+    fn residual(&self) -> Vector6<f64> {
+        let off = self.target.position() - self.tool;
+        let turn = if self.target.rotation().is_some() { self.error } else { Vector3::zeros() };
+        Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z).component_mul(&self.weights)
+    }
+
     /// Derivatives of the tool's place and rotation by every unknown.
     fn differentiate(&mut self) {
         self.columns.clear();
@@ -155,12 +162,8 @@ impl Problem<6> for Chain<'_> {
     fn evaluate(&mut self, z: &[f64], residual: &mut Vector6<f64>, jacobian: &mut [Vector6<f64>]) {
         self.place(z);
         self.differentiate();
-        let off = self.target.position() - self.tool;
+        *residual = self.residual();
         let rotates = self.target.rotation().is_some();
-        for k in 0..3 {
-            residual[k] = self.weights[k] * off[k];
-            residual[k + 3] = if rotates { self.weights[k + 3] * self.error[k] } else { 0.0 };
-        }
         for (column, (velocity, spin)) in jacobian.iter_mut().zip(&self.columns) {
             let turned = if rotates { self.back * spin } else { Vector3::zeros() };
             for k in 0..3 {
@@ -170,9 +173,19 @@ impl Problem<6> for Chain<'_> {
         }
     }
 
-    fn met(&self, _: &Vector6<f64>) -> bool {
-        let (distance, angle) = self.misses();
-        distance <= self.settings.position_tolerance && angle <= self.settings.rotation_tolerance
+    fn squared(&mut self, z: &[f64]) -> f64 {
+        self.place(z);
+        self.residual().norm_squared()
+    }
+
+    fn met(&self, residual: &Vector6<f64>) -> bool {
+        // Not by `misses`: the point evaluated last may be another.
+        let sum = |rows: std::ops::Range<usize>| {
+            let counted = rows.filter(|k| self.weights[*k] > 0.0);
+            counted.map(|k| (residual[k] / self.weights[k]).powi(2)).sum::<f64>().sqrt()
+        };
+        sum(0..3) <= self.settings.position_tolerance
+            && sum(3..6) <= self.settings.rotation_tolerance
     }
 
     fn add_hessian(&self, weights: &Vector6<f64>, hessian: &mut [f64]) {
@@ -229,6 +242,147 @@ impl Problem<6> for Chain<'_> {
         for (i, stiffness) in self.stiffness.iter().enumerate() {
             for k in [width * i, width * i + 1] {
                 hessian[k * size + k] += stiffness;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // A test may stop where it fails.
+mod tests {
+    use nalgebra::{Matrix4, Rotation3};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::constant_curvature::ConstantCurvatureSettings;
+    use crate::robot::{Backbone, BackboneSpec, PerDisk, Routing, Tendon};
+
+    fn robot(placed: bool) -> Robot {
+        let mut spec = BackboneSpec::straight(0.2, 1);
+        spec.length = vec![0.06, 0.0625, 0.064];
+        spec.subsegments = vec![1; 3];
+        let tendon = |k: usize| {
+            let (azimuth, radius) = (PerDisk::Same(2.2 * k as f64), PerDisk::Same(0.005));
+            let routing = Routing::Angles { azimuth, radius };
+            Tendon::new(routing, Some(k / 3 + 1), None, None).unwrap()
+        };
+        let frame = |rotation: [f64; 3], translation: [f64; 3]| -> Matrix4<f64> {
+            let mut frame = Rotation3::new(Vector3::from(rotation)).to_homogeneous();
+            (0..3).for_each(|i| frame[(i, 3)] = translation[i]);
+            frame
+        };
+        let base = placed.then(|| frame([0.4, -1.0, 2.0], [0.1, -0.2, 0.3]));
+        let tool = placed.then(|| frame([-0.7, 0.5, 0.2], [0.01, 0.02, 0.05]));
+        let backbone = Backbone::new(spec).unwrap();
+        let tendons = (0..9).map(tendon).collect();
+        Robot::new(backbone, tendons, base.as_ref(), tool.as_ref(), None).unwrap()
+    }
+
+    fn uniform(seed: u64) -> impl FnMut(f64, f64) -> f64 {
+        let mut draws = ChaCha8Rng::seed_from_u64(seed);
+        move |low, high| draws.random_range(low..high)
+    }
+
+    /// Unknowns of three segments, straight in every fourth case.
+    fn unknowns(case: usize, extensible: bool, u: &mut impl FnMut(f64, f64) -> f64) -> Vec<f64> {
+        let mut z = Vec::new();
+        for _ in 0..3 {
+            let size = if case.is_multiple_of(4) { 0.0 } else { 2.5 };
+            z.extend([size * u(-1.0, 1.0), size * u(-1.0, 1.0)]);
+            if extensible {
+                z.push(u(0.6, 1.8));
+            }
+        }
+        z
+    }
+
+    /// Jacobian against differences of residuals, and second derivatives against differences of the
+    /// Jacobian: to positions and to poses up to 3 rad off.
+    #[test]
+    fn derivatives_agree_with_differences() {
+        let mut u = uniform(51);
+        let mut largest = 0.0_f64;
+        for case in 0..400 {
+            let (extensible, placed, posed) = (case % 2 == 1, case % 8 < 4, case % 5 > 0);
+            let robot = robot(placed);
+            let choices = ConstantCurvatureSettings { extensible, ..Default::default() };
+            let plan = Plan::new(&robot, choices).unwrap();
+            let settings = InverseSettings {
+                position_weight: [1.0, 0.5, 2.0],
+                rotation_weight: [None, Some(0.1), Some(0.02)],
+                ..InverseSettings::default()
+            };
+            let mut chain = Chain::new(&robot, &plan, &settings);
+            let z = unknowns(case, extensible, &mut u);
+            chain.place(&z);
+            let tip = chain.frames[3].compose(robot.tool());
+            let axis = Vector3::from_fn(|_, _| u(-1.0, 1.0)).normalize();
+            let off = axis * if case % 3 == 0 { 1e-6 } else { u(0.0, 3.0) };
+            largest = largest.max(off.norm());
+            let translation = tip.translation + Vector3::from_fn(|_, _| u(-0.1, 0.1));
+            chain.aim(if posed {
+                Target::Pose(Pose { rotation: tip.rotation * so3::exp(&off), translation })
+            } else {
+                Target::Position(translation)
+            });
+            check(&mut chain, &z, &Vector6::from_fn(|_, _| u(-1.0, 1.0)), case);
+        }
+        assert!(largest > 2.95);
+    }
+
+    fn check(chain: &mut Chain<'_>, z: &[f64], weights: &Vector6<f64>, case: usize) {
+        let (size, h) = (z.len(), 1e-5);
+        let mut at = |z: &[f64]| {
+            let (mut residual, mut jacobian) = (Vector6::zeros(), vec![Vector6::zeros(); size]);
+            chain.evaluate(z, &mut residual, &mut jacobian);
+            let mut hessian = vec![0.0; size * size];
+            chain.add_hessian(weights, &mut hessian);
+            (residual, jacobian, hessian)
+        };
+        let (_, jacobian, hessian) = at(z);
+        for a in 0..size {
+            let mut moved = |by: f64| {
+                let mut z = z.to_vec();
+                z[a] += by;
+                at(&z)
+            };
+            let (up, down) = (moved(h), moved(-h));
+            let column = (up.0 - down.0) / (2.0 * h);
+            let scale = 1.0 + column.amax();
+            assert!((column - jacobian[a]).amax() < 1e-7 * scale, "{case} {a}");
+            for b in 0..=a {
+                let bent = weights.dot(&(up.1[b] - down.1[b])) / (2.0 * h);
+                let off = (hessian[a * size + b] - bent).abs();
+                assert!(off < 1e-6 * (1.0 + bent.abs()), "{case} {a} {b} {off:e} {bent}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_energy_has_its_derivatives() {
+        let robot = robot(false);
+        let mut u = uniform(52);
+        for extensible in [false, true] {
+            let choices = ConstantCurvatureSettings { extensible, ..Default::default() };
+            let plan = Plan::new(&robot, choices).unwrap();
+            let settings = InverseSettings::default();
+            let chain = Chain::new(&robot, &plan, &settings);
+            let z = unknowns(1, extensible, &mut u);
+            let size = z.len();
+            let (mut slope, mut other) = (vec![0.0; size], vec![0.0; size]);
+            let mut hessian = vec![0.0; size * size];
+            chain.energy(&z, &mut slope);
+            chain.add_energy_hessian(&z, &mut hessian);
+            for a in 0..size {
+                let h = 1e-4;
+                let mut moved = z.clone();
+                moved[a] += h;
+                let up = chain.energy(&moved, &mut other);
+                assert!((other[a] - slope[a] - h * hessian[a * (size + 1)]).abs() < 1e-12);
+                moved[a] -= 2.0 * h;
+                let down = chain.energy(&moved, &mut other);
+                assert!(((up - down) / (2.0 * h) - slope[a]).abs() < 1e-10);
             }
         }
     }

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use super::bounds::{Bounds, Reach, rest};
 use super::chain::Chain;
 use super::search::{Effort, Found, Search};
-use super::{InverseSettings, Target};
+use super::{InverseSettings, Method, Target};
 use crate::constant_curvature::{Arc, Plan, displacements};
 use crate::error::InvalidInput;
 use crate::robot::Robot;
@@ -105,11 +105,10 @@ impl<'a> ConstantCurvatureInverse<'a> {
         work.chain.aim(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
         let given = usize::from(start.is_some());
-        let found =
-            work.search.run(&mut work.chain, &self.reach.region, effort, |k, point| match start {
-                Some(arcs) if k == 0 => self.unknowns(arcs, point),
-                _ => self.start(target, k - given, point),
-            });
+        let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| match start {
+            Some(arcs) if k == 0 => self.unknowns(arcs, point),
+            _ => self.start(target, k - given, point),
+        });
         Self::answer(found, &work.chain)
     }
 
@@ -118,7 +117,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
     pub fn follow(&self, target: &Target, work: &mut Workspace<'_>) -> Answer {
         work.chain.aim(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
-        let found = work.search.run(&mut work.chain, &self.reach.region, effort, |k, point| {
+        let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| {
             if k > 0 {
                 self.start(target, k - 1, point);
             }
@@ -137,14 +136,14 @@ impl<'a> ConstantCurvatureInverse<'a> {
     #[must_use]
     pub fn solutions_in(&self, target: &Target, work: &mut Workspace<'_>) -> Vec<Solution> {
         work.chain.aim(*target);
-        let effort = Effort { starts: 1, ..self.effort(&work.chain, 1) };
         let mut distinct: Vec<(Vec<f64>, Solution)> = Vec::new();
         let mut slope = vec![0.0; self.reach.region.size()];
         for k in 0..self.settings.starts {
             if work.search.stopped() {
                 break;
             }
-            let found = work.search.run(&mut work.chain, &self.reach.region, effort, |_, point| {
+            let effort = Effort { first: k, ..self.effort(&work.chain, 1) };
+            let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| {
                 self.start(target, k, point);
             });
             if found.status != Status::Converged {
@@ -166,11 +165,15 @@ impl<'a> ConstantCurvatureInverse<'a> {
         distinct.into_iter().map(|(_, solution)| solution).collect()
     }
 
-    fn effort(&self, chain: &Chain<'_>, starts: usize) -> Effort {
+    fn effort(&self, chain: &Chain<'_>, starts: usize) -> Effort<'_> {
         Effort {
+            first: 0,
             starts,
             max_iterations: self.settings.max_iterations,
-            redundant: self.reach.freedoms > chain.rows(),
+            redundant: self.settings.least_energy && self.reach.freedoms > chain.rows(),
+            method: self.settings.method,
+            fall_back: self.settings.method == Method::Newton && starts > 1,
+            swarm: &self.settings.swarm,
         }
     }
 
@@ -255,24 +258,24 @@ impl<'a> ConstantCurvatureInverse<'a> {
         }
     }
 
-    /// All segments on the circle that leaves the base along z and passes the target.
+    /// All segments on the circle that leaves the base along z and brings the tool to the target.
     fn single_arc(&self, target: &Target, point: &mut Vec<f64>) {
-        let mut tip = target.position();
-        let tool = self.robot.tool();
-        if let Target::Pose(pose) = target {
-            tip = pose.compose(&tool.inverse()).translation;
-        }
-        let local: Vector3<f64> = self.robot.base().inverse().transform(&tip);
-        let across = local.x.hypot(local.y);
-        let half = across.atan2(local.z);
-        let angle = 2.0 * half;
-        let length = if half > 0.0 { local.norm() * half / half.sin() } else { local.norm() };
-        let direction =
-            if across > 0.0 { Vector2::new(local.x, local.y) / across } else { Vector2::x() };
+        let (base, tool) = (self.robot.base().inverse(), self.robot.tool());
         let rest: f64 = self.plan.segments().map(|segment| segment.rest_length).sum();
+        let (bend, length) = match target {
+            Target::Pose(pose) => {
+                let tip = pose.compose(&tool.inverse()).translation;
+                arc_to(&base.transform(&tip), &Vector3::zeros(), rest)
+            }
+            Target::Position(position) => {
+                arc_to(&base.transform(position), &tool.translation, rest)
+            }
+        };
+        let angle = bend.norm();
         for (segment, (widest, shortest, longest)) in self.plan.segments().zip(&self.reach.draws) {
-            let bend = direction * (angle * segment.rest_length / rest).min(*widest);
-            point.extend_from_slice(bend.as_slice());
+            let share = segment.rest_length / rest;
+            let share = if angle * share > *widest { widest / angle } else { share };
+            point.extend_from_slice((bend * share).as_slice());
             if self.plan.width() == 3 {
                 point.push((length / rest).clamp(*shortest, *longest));
             }
@@ -303,6 +306,30 @@ impl<'a> ConstantCurvatureInverse<'a> {
             }
         }
     }
+}
+
+/// Bending vector and length of the arc that leaves the origin along z and brings `tool`, given in the frame
+/// of its end, to `point`; of two, the one nearer to a length.
+///
+/// What the tool is off the axis across the bending plane stays as it is, so `point - tool` lies in that
+/// plane; what it is off along the plane, i, is as if the radius were less by i: at half the angle h, with
+/// `q = (r - i) sin h + tool_z cos h`, `point - tool` is at `2 q sin h` across and `point` at
+/// `2 q cos h - tool_z` along z.
+fn arc_to(point: &Vector3<f64>, tool: &Vector3<f64>, wanted: f64) -> (Vector2<f64>, f64) {
+    let off = (point - tool).xy();
+    let (across, along) = (off.norm(), point.z + tool.z);
+    let direction = if across > 0.0 { off / across } else { Vector2::x() };
+    // Bent towards the point, and away from it where the tool leads back (q < 0).
+    let arc = |side: f64| {
+        let half = across.atan2(side * along);
+        let spread = 0.5 * side * across.hypot(along) - tool.z * half.cos();
+        let per_sine = if half > 0.0 { half / half.sin() } else { 1.0 };
+        let aside = side * direction.dot(&tool.xy());
+        (direction * (2.0 * side * half), 2.0 * (spread * per_sine + aside * half))
+    };
+    let (near, far) = (arc(1.0), arc(-1.0));
+    // A negative length is no arc.
+    if far.1 > 0.0 && (far.1 - wanted).abs() < (near.1 - wanted).abs() { far } else { near }
 }
 
 /// Unknowns that differ by more than this are other answers.

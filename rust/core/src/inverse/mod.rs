@@ -9,13 +9,14 @@ mod constant_curvature;
 mod rows;
 mod search;
 mod settings;
+mod swarm;
 
 use nalgebra::{Matrix3, Vector3};
 
 pub use bounds::{Bounds, Range};
 pub use constant_curvature::{Answer, ConstantCurvatureInverse, Solution, Workspace};
 pub use rows::{InverseRows, invert_path, invert_rows};
-pub use settings::InverseSettings;
+pub use settings::{InverseSettings, Method};
 
 use crate::error::InvalidInput;
 use crate::lie::{Pose, so3};

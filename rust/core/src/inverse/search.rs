@@ -3,8 +3,11 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::solve::fit::{Ending, Problem, Purpose, Workspace};
-use crate::solve::region::Region;
+use crate::solve::pso::{PsoSettings, Swarm};
 use crate::status::Status;
+
+use super::Method;
+use super::bounds::Reach;
 
 /// Ends of descents that are kept as candidates for the nearest point.
 const CANDIDATES: usize = 4;
@@ -21,6 +24,7 @@ pub(super) struct Search<'a> {
     pub(super) point: Vec<f64>,
     /// Ends the search before its next start when it is set.
     pub(super) stop: Option<&'a AtomicBool>,
+    pub(super) swarm: Option<Swarm>,
     /// Where descents ended that did not meet the target, by their squared residual, best first.
     candidates: Vec<(f64, Vec<f64>)>,
 }
@@ -35,48 +39,91 @@ pub(super) struct Found {
 
 /// What to search for.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Effort {
+pub(super) struct Effort<'s> {
+    /// The first start, and how many.
+    pub(super) first: usize,
     pub(super) starts: usize,
     pub(super) max_iterations: usize,
     /// There is freedom left for the energy.
     pub(super) redundant: bool,
+    pub(super) method: Method,
+    /// A swarm is the last resort.
+    pub(super) fall_back: bool,
+    pub(super) swarm: &'s PsoSettings,
 }
 
 impl Search<'_> {
-    /// Tries `start(k, point)` for k = 0, 1, ... until a descent meets the target; else finds the point
-    /// nearest to it. `point` holds the answer whatever the status.
+    /// Tries `start(k, point)` for one k after the other until a descent meets the target; else finds the point
+    /// nearest to it. `point` holds the answer whatever the status, and was evaluated last.
     pub(super) fn run<P: Problem<6>>(
         &mut self,
         problem: &mut P,
-        region: &Region,
-        effort: Effort,
-        mut start: impl FnMut(usize, &mut Vec<f64>),
+        reach: &Reach,
+        effort: Effort<'_>,
+        start: impl FnMut(usize, &mut Vec<f64>),
     ) -> Found {
+        let (status, starts) = self.seek(problem, reach, effort, start);
+        if status != Status::Converged {
+            self.fit.evaluate(problem, &self.point);
+        }
+        Found { status, iterations: self.fit.iterations, starts }
+    }
+
+    /// How the search ended, and after how many starts.
+    fn seek<P: Problem<6>>(
+        &mut self,
+        problem: &mut P,
+        reach: &Reach,
+        effort: Effort<'_>,
+        mut start: impl FnMut(usize, &mut Vec<f64>),
+    ) -> (Status, usize) {
         self.fit.iterations = 0;
         self.candidates.clear();
-        for k in 0..effort.starts {
-            if self.stopped() {
-                return self.found(Status::IterationLimit, k);
+        for tried in 0..effort.starts {
+            if tried > 0 && self.stopped() {
+                return (Status::IterationLimit, tried);
             }
-            start(k, &mut self.point);
-            if !self.fit.restore(region, &mut self.point) {
-                if k == 0 {
-                    return self.found(Status::Infeasible, 1);
+            let k = effort.first + tried;
+            let inside = if effort.method == Method::Newton {
+                start(k, &mut self.point);
+                self.fit.restore(&reach.region, &mut self.point)
+            } else {
+                self.settle(problem, reach, effort.swarm, k)
+            };
+            if !inside {
+                if tried == 0 {
+                    return (Status::Infeasible, 1);
                 }
                 continue;
             }
-            let limit = effort.max_iterations;
-            match self.fit.descend(problem, region, &mut self.point, Purpose::Meet, limit) {
-                Ending::Met => {
-                    let status = self.spend_freedom(problem, region, effort);
-                    return self.found(status, k + 1);
-                }
-                Ending::Failed => {}
-                Ending::Stalled | Ending::IterationLimit => self.remember(),
+            if let Some(status) = self.descend(problem, reach, effort) {
+                return (status, tried + 1);
             }
         }
-        let status = self.nearest(problem, region, effort);
-        self.found(status, effort.starts)
+        // A swarm looks where the starts did not.
+        if effort.fall_back
+            && self.settle(problem, reach, effort.swarm, 0)
+            && let Some(status) = self.descend(problem, reach, effort)
+        {
+            return (status, effort.starts);
+        }
+        (self.nearest(problem, reach, effort), effort.starts)
+    }
+
+    /// Descends from the point at hand: the status if it meets the target.
+    fn descend<P: Problem<6>>(
+        &mut self,
+        problem: &mut P,
+        reach: &Reach,
+        effort: Effort<'_>,
+    ) -> Option<Status> {
+        let limit = effort.max_iterations;
+        match self.fit.descend(problem, &reach.region, &mut self.point, Purpose::Meet, limit) {
+            Ending::Met => return Some(self.spend_freedom(problem, reach, effort)),
+            Ending::Failed => {}
+            Ending::Stalled | Ending::IterationLimit => self.remember(),
+        }
+        None
     }
 
     /// Whether it was told to end.
@@ -84,21 +131,17 @@ impl Search<'_> {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
-    fn found(&self, status: Status, starts: usize) -> Found {
-        Found { status, iterations: self.fit.iterations, starts }
-    }
-
     /// Lowers the energy where the target leaves freedom.
     fn spend_freedom<P: Problem<6>>(
         &mut self,
         problem: &mut P,
-        region: &Region,
-        effort: Effort,
+        reach: &Reach,
+        effort: Effort<'_>,
     ) -> Status {
         if !effort.redundant {
             return Status::Converged;
         }
-        match self.fit.lower_energy(problem, region, &mut self.point, LOWER) {
+        match self.fit.lower_energy(problem, &reach.region, &mut self.point, LOWER) {
             Ending::Met => Status::Converged,
             _ => Status::IterationLimit,
         }
@@ -118,16 +161,17 @@ impl Search<'_> {
     fn nearest<P: Problem<6>>(
         &mut self,
         problem: &mut P,
-        region: &Region,
-        effort: Effort,
+        reach: &Reach,
+        effort: Effort<'_>,
     ) -> Status {
         let mut best: Option<(f64, Status, Vec<f64>)> = None;
         for (_, mut point) in std::mem::take(&mut self.candidates) {
-            let ending = self.fit.descend(problem, region, &mut point, Purpose::Nearest, POLISH);
+            let ending =
+                self.fit.descend(problem, &reach.region, &mut point, Purpose::Nearest, POLISH);
             let squared = self.fit.residual.norm_squared();
             if ending == Ending::Met {
                 self.point = point;
-                return self.spend_freedom(problem, region, effort);
+                return self.spend_freedom(problem, reach, effort);
             }
             let status = match ending {
                 Ending::Stalled => Status::Unreachable,

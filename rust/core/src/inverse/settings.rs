@@ -1,6 +1,31 @@
 //! How precisely, how long and with which weights an inverse is sought.
 
 use crate::error::{InvalidInput, positive};
+use crate::solve::pso::PsoSettings;
+
+/// Where descents start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// From given, guessed and random points; a swarm is the last resort.
+    #[default]
+    Newton,
+    /// From where particle swarms settle.
+    Swarm,
+}
+
+impl Method {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Newton, Self::Swarm];
+
+    /// The name used in Python.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Newton => "newton",
+            Self::Swarm => "pso",
+        }
+    }
+}
 
 /// Choices of an inverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +39,13 @@ pub struct InverseSettings {
     /// What one radian about each tool axis counts \[m\]; 0 leaves the axis free; default 0.3 of the
     /// robot's length.
     pub rotation_weight: [Option<f64>; 3],
+    /// Where descents start.
+    pub method: Method,
+    /// The swarms, if there are any. They minimise the squared weighted miss over the robot's length.
+    pub swarm: PsoSettings,
+    /// Whether freedom that the target leaves goes to the least bending energy; else the answer is the
+    /// one nearest to its start, as a path without jumps needs it.
+    pub least_energy: bool,
     /// Starts at most before the target counts as out of reach.
     pub starts: usize,
     /// Steps per descent at most.
@@ -22,6 +54,14 @@ pub struct InverseSettings {
     pub seed: u64,
 }
 
+/// A swarm that hands over to descents: 1 % of the robot's length is near enough.
+const SWARM: PsoSettings = PsoSettings {
+    target: Some(1e-4),
+    stagnation: Some(30),
+    max_iterations: 300,
+    ..PsoSettings::constriction()
+};
+
 impl Default for InverseSettings {
     fn default() -> Self {
         Self {
@@ -29,6 +69,9 @@ impl Default for InverseSettings {
             rotation_tolerance: 1e-10,
             position_weight: [1.0; 3],
             rotation_weight: [None; 3],
+            method: Method::Newton,
+            swarm: SWARM,
+            least_energy: true,
             starts: 200,
             max_iterations: 50,
             seed: 0,
@@ -67,6 +110,6 @@ impl InverseSettings {
                 return Err(InvalidInput::new(argument, "1 or more", value));
             }
         }
-        Ok(())
+        self.swarm.validate().map_err(|error| error.within("swarm"))
     }
 }

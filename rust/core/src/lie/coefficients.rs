@@ -19,6 +19,7 @@ const C: Series = series(3, 0);
 const B_SLOPE: Series = series(4, 1);
 const B_BEND: Series = series(6, 2);
 const C_SLOPE: Series = series(5, 1);
+const C_BEND: Series = series(7, 2);
 const D_SLOPE: Series = series(6, 1);
 
 /// The coefficients of `Σ (−x)ʲ / (2j + k)!`, each times `2j + 2` after one derivative `d/dt / t`, and
@@ -100,6 +101,11 @@ impl Angle {
     /// `c′(t) / t = (b − 3c) / t²`.
     pub(crate) fn c_slope(&self) -> f64 {
         self.sum(&C_SLOPE).map_or_else(|| (self.b() - 3.0 * self.c()) / self.x, |sum| -sum)
+    }
+
+    /// `(c′ / t)′ / t = (b′/t − 5 c′/t) / t²`.
+    pub(crate) fn c_bend(&self) -> f64 {
+        self.sum(&C_BEND).unwrap_or_else(|| (self.b_slope() - 5.0 * self.c_slope()) / self.x)
     }
 
     /// `d′(t) / t = (1 + a − 4b) / (2 b t⁴)`.

@@ -23,6 +23,9 @@ pub trait Problem<const R: usize> {
         jacobian: &mut [SVector<f64, R>],
     );
 
+    /// The squared residuals alone.
+    fn squared(&mut self, z: &[f64]) -> f64;
+
     /// Whether residuals are as small as wanted.
     fn met(&self, residual: &SVector<f64, R>) -> bool;
 
@@ -71,12 +74,15 @@ const STUCK: f64 = 1e12;
 const HEADWAY: f64 = 1e-3;
 /// ...and this many of them are a stall.
 const PATIENCE: usize = 5;
-/// Weight of rows along which no step is wanted, over the size of the Hessian.
-const STIFF: f64 = 10.0;
+/// Weight of rows along which no step is wanted, over the size of the Hessian: enough for strong multipliers,
+/// whose curvature across the rows would otherwise have to be damped away.
+const STIFF: f64 = 100.0;
 /// A row adds nothing to others when this share of its square is outside them.
 const DEPENDENT: f64 = 1e-12;
 /// A minimum is found when the gradient of the Lagrangian is this share of what it can be.
 const STATIONARY: f64 = 1e-11;
+/// Residuals of order 1 are known to this.
+const ROUNDING: f64 = 1e-15;
 
 /// Buffers, reused from one descent to the next.
 #[derive(Clone, Debug)]
@@ -124,6 +130,12 @@ impl<const R: usize> Workspace<R> {
         region.restore(z, &mut self.inside)
     }
 
+    /// Evaluates the problem at a point.
+    pub fn evaluate<P: Problem<R>>(&mut self, problem: &mut P, z: &[f64]) {
+        self.jacobian.resize(z.len(), SVector::zeros());
+        problem.evaluate(z, &mut self.residual, &mut self.jacobian);
+    }
+
     /// Descends from `z`, a point of the region.
     pub fn descend<P: Problem<R>>(
         &mut self,
@@ -133,10 +145,8 @@ impl<const R: usize> Workspace<R> {
         purpose: Purpose,
         max_iterations: usize,
     ) -> Ending {
-        let size = region.size();
-        self.jacobian.resize(size, SVector::zeros());
-        self.trial_jacobian.resize(size, SVector::zeros());
-        problem.evaluate(z, &mut self.residual, &mut self.jacobian);
+        self.trial_jacobian.resize(region.size(), SVector::zeros());
+        self.evaluate(problem, z);
         let mut squared = self.residual.norm_squared();
         let (mut damping, mut idle) = (DAMPING, 0);
         self.program.active.clear();
@@ -161,6 +171,10 @@ impl<const R: usize> Workspace<R> {
                 damping *= 0.2;
             } else {
                 damping = (8.0 * damping).max(1e-9);
+                if purpose == Purpose::Nearest {
+                    // Second derivatives are those of the point evaluated last.
+                    self.evaluate(problem, z);
+                }
             }
             let stuck = damping > STUCK || (purpose == Purpose::Meet && idle > PATIENCE);
             if stuck {
@@ -272,7 +286,7 @@ impl<const R: usize> Workspace<R> {
     fn stationary(&self, squared: f64) -> bool {
         let steepest = self.jacobian.iter().fold(0.0_f64, |most, column| most.max(column.norm()));
         let left = self.program.lagrangian_gradient(&self.rows);
-        left <= STATIONARY * steepest * squared.sqrt()
+        left <= steepest * (STATIONARY * squared.sqrt()).max(ROUNDING)
     }
 
     /// Takes the model's step if it lowers the squared residual, which is returned.

@@ -54,8 +54,16 @@ pub enum Outcome {
 /// Violations below this count as met; steps and normals are of order 1.
 const MET: f64 = 1e-13;
 
-/// A row is dependent on the active ones when its part outside them is this small a share of it.
+/// An equation is dependent on others when the square of its part outside them, in the Hessian's metric, is
+/// this small a share of it: rows of a Jacobian near where it is singular.
 const DEPENDENT: f64 = 1e-11;
+/// The same for an inequality: independent rows come as near as the inverse of the Hessian's condition
+/// (1e13 for least squares with freedom left), dependent ones as near as the rounding of their images.
+const PARALLEL: f64 = 1e-16;
+
+/// A row that depends on active ones contradicts them when it is violated by more than this; below, it is
+/// the rounding of a long way to them.
+const CONTRADICTION: f64 = 1e-9;
 
 /// Buffers of a solve, and its answer.
 #[derive(Clone, Debug, Default)]
@@ -71,6 +79,8 @@ pub struct Quadratic {
     pub active: Vec<usize>,
     /// Their multipliers: `H p + g + sum_k multiplier_k normal_k = 0`; not negative for inequalities.
     pub multipliers: Vec<f64>,
+    /// Rows that depend on active ones and hold as nearly as these do.
+    implied: Vec<usize>,
     /// `L^-1 normal` of every active row.
     images: Vec<f64>,
     /// Orthonormal basis of these.
@@ -95,7 +105,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Cholesky factor in place of the lower triangle, row by row, its diagonal inverted; false unless
 /// positive definite.
-fn cholesky(matrix: &mut [f64], size: usize) -> bool {
+pub(crate) fn cholesky(matrix: &mut [f64], size: usize) -> bool {
     for i in 0..size {
         for j in 0..=i {
             let (above, below) = matrix.split_at_mut(i * size);
@@ -117,7 +127,7 @@ fn cholesky(matrix: &mut [f64], size: usize) -> bool {
 }
 
 /// Solves `L x = x` in place.
-fn forward(factor: &[f64], size: usize, x: &mut [f64]) {
+pub(crate) fn forward(factor: &[f64], size: usize, x: &mut [f64]) {
     for i in 0..size {
         let row = &factor[i * size..i * size + i];
         x[i] = (x[i] - dot(row, &x[..i])) * factor[i * size + i];
@@ -125,7 +135,7 @@ fn forward(factor: &[f64], size: usize, x: &mut [f64]) {
 }
 
 /// Solves `L^T x = x` in place.
-fn backward(factor: &[f64], size: usize, x: &mut [f64]) {
+pub(crate) fn backward(factor: &[f64], size: usize, x: &mut [f64]) {
     for i in (0..size).rev() {
         x[i] *= factor[i * size + i];
         let value = x[i];
@@ -159,6 +169,7 @@ impl Quadratic {
     pub fn solve_free(&mut self) {
         self.active.clear();
         self.multipliers.clear();
+        self.implied.clear();
         self.images.clear();
         self.basis.clear();
         self.triangle.clear();
@@ -176,11 +187,14 @@ impl Quadratic {
         }
         let size = self.size;
         // Every pass adds a row for good or ends; the bound is for arithmetic gone wrong.
-        for _ in 0..4 * (size + rows.offsets.len()) {
+        for _ in 0..=4 * (size + rows.offsets.len()) {
             let (mut worst, mut row) = (MET, usize::MAX);
             for k in rows.equalities..rows.offsets.len() {
                 let off = dot(rows.normal(size, k), &self.step) - rows.offsets[k];
-                if off > worst * (1.0 + rows.offsets[k].abs()) && !self.active.contains(&k) {
+                if off > worst * (1.0 + rows.offsets[k].abs())
+                    && !self.active.contains(&k)
+                    && !self.implied.contains(&k)
+                {
                     (worst, row) = (off, k);
                 }
             }
@@ -266,9 +280,13 @@ impl Quadratic {
             let outside = dot(&self.outside, &self.outside);
             self.solve_triangle();
             let (length, leaving) = self.first_to_leave(rows.equalities);
-            let full = outside > DEPENDENT * whole;
+            let full = outside > PARALLEL * whole;
             if !full && leaving == usize::MAX {
-                return Outcome::Infeasible;
+                if violation > CONTRADICTION || multiplier > 0.0 {
+                    return Outcome::Infeasible;
+                }
+                self.implied.push(row);
+                return Outcome::Solved;
             }
             // |outside|^2 is the curvature along the move.
             let whole_move = if full { violation / outside } else { f64::INFINITY };

@@ -1,0 +1,71 @@
+//! Choices of the rod model.
+
+use crate::error::InvalidInput;
+
+/// Kinematics of an element (design rule of the papers, or a rod's own).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Subsegment {
+    /// A constant-strain arc.
+    #[default]
+    Arc,
+    /// A rigid link that bisects the bend, as in the papers.
+    Link,
+}
+
+impl Subsegment {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Arc, Self::Link];
+
+    /// The name used in Python.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Arc => "arc",
+            Self::Link => "link",
+        }
+    }
+}
+
+/// Choices of the rod model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RodSettings {
+    /// Kinematics of an element.
+    pub subsegment: Subsegment,
+    /// Elements between two disks.
+    pub elements: usize,
+    /// Relative residual of forces and lengths that counts as solved.
+    pub tolerance: f64,
+    /// Newton steps at most, all load steps together.
+    pub max_iterations: usize,
+}
+
+impl Default for RodSettings {
+    fn default() -> Self {
+        Self { subsegment: Subsegment::Arc, elements: 1, tolerance: 1e-11, max_iterations: 500 }
+    }
+}
+
+/// Elements per subsegment at most.
+const MOST_ELEMENTS: usize = 100;
+
+impl RodSettings {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a value out of range.
+    pub fn validate(&self) -> Result<(), InvalidInput> {
+        if !(1..=MOST_ELEMENTS).contains(&self.elements) {
+            let expected = format!("a whole number from 1 to {MOST_ELEMENTS}");
+            return Err(InvalidInput::new("elements", expected, self.elements));
+        }
+        if !(self.tolerance > 0.0 && self.tolerance <= 1e-3) {
+            let expected = "a number in (0, 1e-3]";
+            return Err(InvalidInput::new("tolerance", expected, format!("{:?}", self.tolerance)));
+        }
+        if self.max_iterations == 0 || self.max_iterations > 1_000_000 {
+            let expected = "a whole number from 1 to 1000000";
+            return Err(InvalidInput::new("max_iterations", expected, self.max_iterations));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,76 @@
+//! The rod against golden data of an independent solver, `tests/data/rod_unloaded.json`.
+
+use nalgebra::{Matrix3, Vector3};
+use serde_json::Value;
+use tdcr::Status;
+use tdcr::model::Model;
+use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
+use tdcr::rod::{Plan, Rod, RodSettings};
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+fn count(value: &Value) -> usize {
+    usize::try_from(value.as_u64().unwrap()).unwrap()
+}
+
+fn robot(case: &Value) -> Robot {
+    let at = numbers(&case["disk_arclength"]);
+    let mut spec = BackboneSpec::straight(1.0, 1);
+    spec.length = at.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    spec.subsegments = vec![1; at.len() - 1];
+    spec.poisson_ratio = case["poisson_ratio"].as_f64().unwrap();
+    let ends = case["end"].as_array().unwrap();
+    let tendons = case["holes"].as_array().unwrap().iter().zip(ends).map(|(holes, end)| {
+        let end = count(end);
+        let holes: Vec<Vec<f64>> = holes.as_array().unwrap()[..=end].iter().map(numbers).collect();
+        let azimuth = PerDisk::Each(holes.iter().map(|h| h[1].atan2(h[0])).collect());
+        let radius = PerDisk::Each(holes.iter().map(|h| h[0].hypot(h[1])).collect());
+        Tendon::new(Routing::Angles { azimuth, radius }, Some(end), None, None).unwrap()
+    });
+    let tendons = tendons.collect();
+    Robot::new(Backbone::new(spec).unwrap(), tendons, None, None, None).unwrap()
+}
+
+#[test]
+fn every_determinate_case_is_met_at_every_disk() {
+    let text = include_str!("../data/rod_unloaded.json");
+    let data: Value = serde_json::from_str(text).unwrap();
+    let (mut place_off, mut turn_off, mut tension_off) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for case in data["cases"].as_array().unwrap() {
+        let robot = robot(case);
+        let taut: Vec<bool> =
+            case["taut"].as_array().unwrap().iter().map(|t| t.as_bool().unwrap()).collect();
+        let given = numbers(&case["displacement"]);
+        let pulls: Vec<f64> =
+            given.iter().zip(&taut).map(|(d, t)| if *t { *d } else { f64::INFINITY }).collect();
+        let elements = count(&case["elements"]);
+        let plan = Plan::new(&robot, RodSettings { elements, ..Default::default() });
+        let shape = Rod::new(&robot, &plan).shape(&pulls).unwrap();
+        assert_eq!(shape.report.status, Status::Converged, "{}: {}", case["id"], shape.message);
+        assert!(shape.report.residual < 1e-11, "{}", case["id"]);
+        let wanted = case["frames"].as_array().unwrap();
+        for (frame, wanted) in shape.state.frames.iter().zip(wanted) {
+            let rows: Vec<Vec<f64>> = wanted.as_array().unwrap().iter().map(numbers).collect();
+            let place = Vector3::new(rows[0][3], rows[1][3], rows[2][3]);
+            let turn = Matrix3::from_fn(|i, j| rows[i][j]);
+            place_off = place_off.max((frame.translation - place).norm());
+            turn_off = turn_off.max((frame.rotation - turn).amax());
+        }
+        let stiffness = case["EI"].as_f64().unwrap();
+        let tensions = numbers(&case["tension"]);
+        // One segment with three taut tendons: any tensions that push along its axis too.
+        if taut != [true; 3] {
+            for (mine, theirs) in shape.state.tensions.iter().zip(&tensions) {
+                let scale = tensions.iter().fold(0.0_f64, |most, t| most.max(*t));
+                tension_off = tension_off.max((mine * stiffness - theirs).abs() / scale);
+            }
+        }
+    }
+    println!(
+        "places to {place_off:.1e} m, rotations to {turn_off:.1e}, tensions to {tension_off:.1e}"
+    );
+    // The data has ten digits; its length is 0.2 m per segment.
+    assert!(place_off < 1e-8 * 0.2 && turn_off < 1e-8 && tension_off < 1e-6);
+}
