@@ -37,6 +37,10 @@ pub fn solve_rows(
 ) -> Result<Rows, InvalidInput> {
     let stopped = || control.stop.load(Ordering::Relaxed);
     let job = |rows: &[Row]| {
+        // The jobs that are left cost nothing, not even a swarm's memory.
+        if stopped() {
+            return Ok(Vec::new());
+        }
         let mut solver = solver.clone();
         let mut answers = Vec::with_capacity(rows.len());
         for row in rows {
