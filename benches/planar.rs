@@ -2,7 +2,9 @@
 //!
 //! `two_sections`: every solution of a target, mean over 1,000 targets made by random turns within
 //! 2 pi, and of the straight trunk, a double solution. `nearest`: out of reach. `inverse`: least energy
-//! from all starts. `curve`: Simpson's rule through a spline.
+//! from all starts. `swarm`: the inverse by particle swarm and polish, to 1e-12 m, mean over the
+//! paper's path t = 0 ... 8 and 1,000 seeds; and three sections around a circle. `curve`: Simpson's
+//! rule through a spline.
 #![allow(missing_docs, clippy::unwrap_used)] // criterion's macros; a bench may stop on a bad answer.
 
 use std::f64::consts::{PI, TAU};
@@ -14,7 +16,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tdcr::Status;
 use tdcr::batch::{Control, pool};
-use tdcr::planar::{AngleFunction, Goal, InverseSettings, Trunk, TwoSections, inverse, solve_many};
+use tdcr::planar::{
+    AngleFunction, Circle, Goal, InverseSettings, SwarmInverse, SwarmSettings, SwarmSolver, Trunk,
+    TwoSections, Unknowns, Word, inverse, solve_many,
+};
+use tdcr::solve::pso::{PsoSettings, Topology};
 
 fn two_sections(c: &mut Criterion) {
     let mut group = c.benchmark_group("planar");
@@ -96,5 +102,44 @@ fn rest(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(all, two_sections, batch, rest);
+fn one(solver: &mut SwarmSolver<'_>, goal: &Goal, seed: u64) -> SwarmInverse {
+    solver.solve(goal, seed, &mut |_| Word::GoOn).unwrap().unwrap()
+}
+
+fn swarm(c: &mut Criterion) {
+    let mut group = c.benchmark_group("planar/swarm");
+    let trunk = Trunk::new(vec![0.140, 0.120], 0.01).unwrap();
+    let to = |x, y| Goal { point: Vector2::new(x, y), heading: None, limits: vec![TAU] };
+    let path: Vec<Goal> =
+        (0..=8).map(|t| 0.015 * f64::from(t)).map(|way| to(0.26 - way, way)).collect();
+    let swarm = PsoSettings { topology: Topology::Ring, ..PsoSettings::default() };
+    let ring = SwarmSettings { swarm, ..SwarmSettings::default() };
+    let points = SwarmSettings { unknowns: Unknowns::Points, ..SwarmSettings::default() };
+    for (name, settings) in
+        [("global", SwarmSettings::default()), ("ring", ring), ("points", points)]
+    {
+        let mut solver = SwarmSolver::new(&trunk, &[], &settings).unwrap();
+        for seed in 0..1000 {
+            assert!(path.iter().all(|goal| one(&mut solver, goal, seed).inverse.error <= 1e-12));
+        }
+        let mut next = 0;
+        group.bench_function(format!("path_point/{name}"), |b| {
+            b.iter(|| {
+                next += 1;
+                let goal = &path[usize::try_from(next).unwrap() % path.len()];
+                one(&mut solver, black_box(goal), next / path.len() as u64 % 1000)
+            });
+        });
+    }
+    let trunk = Trunk::new(vec![0.1; 3], 0.01).unwrap();
+    let circles = [Circle::new(0.1, 0.04, 0.02).unwrap()];
+    let mut solver = SwarmSolver::new(&trunk, &circles, &ring).unwrap();
+    let goal = to(0.2, 0.1);
+    assert!(one(&mut solver, &goal, 0).clearance >= 0.0);
+    group.sample_size(20);
+    group.bench_function("around_a_circle/3_sections", |b| b.iter(|| one(&mut solver, &goal, 0)));
+    group.finish();
+}
+
+criterion_group!(all, two_sections, batch, rest, swarm);
 criterion_main!(all);

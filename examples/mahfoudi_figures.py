@@ -1,9 +1,11 @@
-"""Figures 4 to 7 of Mahfoudi, Amouri & Zaatri, remade, and their printed platforms beside ours.
+"""Figures 4 to 8 and 10 to 12 of Mahfoudi, Amouri & Zaatri, remade, and their numbers beside ours.
 
 The paper ("New approach to modeling a planar flexible continuum robot simulating elephant trunk")
 bends one section of 200 mm and three of 200, 150 and 100 mm, and prints the platforms of the three.
-Its cable distance is not printed; 60 mm gives the first platform to all printed digits. Each figure
-is written as a picture and as CSV; the table says which numbers follow from which reading.
+Its cable distance is not printed; 60 mm gives the first platform to all printed digits. Then it
+leads two sections of 140 and 120 mm along a line by particle swarm, in 0.128 s per point. Each
+figure is written as a picture and as CSV; the table says which numbers follow from which reading.
+Figure 9 is a flow chart.
 
     python examples/mahfoudi_figures.py --output examples/figures
 """
@@ -12,6 +14,8 @@ from __future__ import annotations
 
 import argparse
 import csv
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib as mpl
@@ -31,6 +35,11 @@ STEPS = (0.0, 0.010, 0.020, 0.030)
 CABLES = [(0.170, 0.230), (0.170, 0.130), (0.130, 0.070)]
 PRINTED = np.array([[165.40, 95.49], [294.05, 133.97], [382.77, 158.08]])
 HEADINGS = np.array([np.pi / 3, -0.486, np.pi / 3])
+# Section 3.3: x = 260 - 15 t, y = 15 t mm, and its mean time per point.
+TWO = planar.PlanarTrunk([0.140, 0.120], 0.030)
+TIMES = (0, 2, 4, 6, 8)
+PATH = [(0.260 - 0.015 * t, 0.015 * t) for t in TIMES]
+PRINTED_SECONDS = 0.128
 
 Array = NDArray[np.float64]
 
@@ -140,6 +149,134 @@ def figures_6_and_7(folder: Path) -> None:
     save(functions, folder, "mahfoudi_07", ["reading", "s_mm", "angle_rad"], nodes)
 
 
+def figure_8(folder: Path) -> None:
+    """Draw an arc with the parameters that eqs. 12 to 14 read off its end."""
+    shape = ONE.shape([1.9])
+    x, y = shape.tip
+    theta = np.arctan2(y, x)
+    kappa = np.sqrt(2 * (1 - np.cos(2 * theta)) / (x**2 + y**2))
+    figure = Figure(figsize=(4.2, 3.6), layout="constrained")
+    axes = figure.add_subplot()
+    curve = shape.curve(200).points * MM
+    middle = np.array([0, 1 / kappa]) * MM
+    (line,) = axes.plot(*curve.T, lw=2.2)
+    for end in (np.zeros(2), shape.tip * MM):
+        axes.plot(*np.array([middle, end]).T, color="0.6", lw=0.9)
+    axes.plot([0, x * MM], [0, y * MM], "k--", lw=0.9)
+    axes.plot([0, 90], [0, 0], color="0.6", lw=0.9)
+    for radius, start, end, center in ((45, 0, theta, (0, 0)), (30, -np.pi / 2, 0.33, middle)):
+        arc = np.linspace(start, end, 60)
+        axes.plot(center[0] + radius * np.cos(arc), center[1] + radius * np.sin(arc), "k", lw=0.8)
+    axes.plot(*np.array([np.zeros(2), middle, shape.tip * MM]).T, "o", ms=4, color=line.get_color())
+    for text, place in (
+        ("θ", (50, 18)),
+        ("2θ", (middle[0] + 22, middle[1] - 30)),
+        ("1/κ", (-20, 55)),
+        ("P (x, y)", (x * MM + 5, y * MM)),
+        ("o", (-9, -8)),
+        ("s = 2θ/κ", (100, 48)),
+    ):
+        axes.text(*place, text)
+    axes.set(xlim=(-40, 175), ylim=(-22, 165))
+    axes.set_title("Angle and curvature from the end")
+    plane(axes)
+    rows: list[list[object]] = [[x * MM, y * MM, theta, kappa / MM, 2 * theta / kappa * MM]]
+    assert abs(2 * theta / kappa - 0.200) < 1e-12
+    save(figure, folder, "mahfoudi_08", ["x_mm", "y_mm", "theta_rad", "kappa_1_mm", "s_mm"], rows)
+
+
+def figure_10(folder: Path) -> None:
+    """Draw the axis at every printed time, on both branches of exact solutions."""
+    figure = Figure(figsize=(7.2, 2.9), layout="constrained")
+    panes = figure.subplots(1, 2, sharex=True, sharey=True)
+    colors = mpl.colormaps["viridis"](np.linspace(0, 0.9, len(TIMES)))
+    rows: list[list[object]] = []
+    for t, (x, y), color in zip(TIMES, PATH, colors, strict=True):
+        exact = planar.two_section_solutions(*TWO.lengths, x, y)
+        for branch, axes in enumerate(panes):
+            # The straight trunk is the double solution where both begin.
+            shape = TWO.shape(exact[min(branch, len(exact) - 1)])
+            points = shape.curve(60).points * MM
+            axes.plot(*points.T, color=color, lw=1.8, label=f"t = {t}")
+            axes.plot(*(shape.positions * MM).T, "o", ms=4, color=color)
+            rows += [[t, branch + 1, *shape.turns, *(p * MM).round(6)] for p in points[::12]]
+    for branch, axes in enumerate(panes):
+        axes.plot(*(np.array(PATH) * MM).T, "k--", lw=0.9, zorder=0)
+        plane(axes)
+        axes.set_title(("least bending energy", "the other branch")[branch])
+    panes[1].set_ylabel("")
+    panes[0].legend(frameon=False, loc="upper left")
+    header = ["t", "branch", "turn1_rad", "turn2_rad", "x_mm", "y_mm"]
+    save(figure, folder, "mahfoudi_10", header, rows)
+
+
+def figure_11(folder: Path) -> None:
+    """Draw the trunk with cables and platforms as the swarm finds it along the path."""
+    figure = Figure(figsize=(5.2, 3.75), layout="constrained")
+    axes = figure.add_subplot()
+    colors = mpl.colormaps["viridis"](np.linspace(0, 0.9, len(TIMES)))
+    rows: list[list[object]] = []
+    for t, (x, y), color in zip(TIMES, PATH, colors, strict=True):
+        best = planar.two_section_solutions(*TWO.lengths, x, y)[0]
+        # Another seed, another branch: the first seed on the one of least energy.
+        tries = (TWO.inverse(x, y, method="pso", seed=seed) for seed in range(100))
+        found = next(a for a in tries if np.allclose(a.turns, best, atol=1e-5))
+        assert found.ok
+        curve = found.shape.curve(60)
+        sideways = np.stack([-np.sin(curve.headings), np.cos(curve.headings)], axis=1)
+        left, right = (curve.points + side * 0.015 * sideways for side in (1, -1))
+        for cable in (left, right):
+            axes.plot(*(cable * MM).T, color=color, lw=0.9)
+        ends = [0, 59, 119]
+        axes.plot(*np.stack([left[ends], right[ends]]).transpose(2, 0, 1) * MM, color=color, lw=2.2)
+        axes.plot(*(curve.points * MM).T, "--", color=color, lw=0.9, label=f"t = {t}")
+        rows.append([t, found.seed, *found.turns, found.error * MM, found.energy])
+    axes.plot(*(np.array(PATH) * MM).T, "k.", ms=6, zorder=9)
+    plane(axes)
+    axes.set_title("Two sections on a line, by particle swarm")
+    axes.legend(frameon=False, loc="upper right")
+    header = ["t", "seed", "turn1_rad", "turn2_rad", "error_mm", "energy_1_m"]
+    save(figure, folder, "mahfoudi_11", header, rows)
+
+
+def seconds(solve: Callable[[int], object], runs: int) -> float:
+    """Return the mean time of a run, in seconds of the processor."""
+    begin = time.process_time()
+    for run in range(runs):
+        solve(run)
+    return (time.process_time() - begin) / runs
+
+
+def figure_12(folder: Path) -> None:
+    """Draw the time per point: our swarm and exact solver from Python, and the printed mean."""
+    figure = Figure(figsize=(5.2, 3.2), layout="constrained")
+    axes = figure.add_subplot()
+    rows: list[list[object]] = []
+    for t, (x, y) in zip(TIMES, PATH, strict=True):
+
+        def swarm(seed: int, x: float = x, y: float = y) -> None:
+            assert TWO.inverse(x, y, method="pso", seed=seed).error < 1e-9
+
+        def exact(_: int, x: float = x, y: float = y) -> None:
+            planar.two_section_solutions(*TWO.lengths, x, y)
+
+        rows.append([t, seconds(swarm, 1000) * 1e6, seconds(exact, 1000) * 1e6])
+    at = np.array(TIMES, dtype=np.float64)
+    for k, label in ((1, "swarm and polish, 1,000 seeds"), (2, "every exact solution")):
+        bars = axes.bar(at + (k - 1.5) * 0.7, [row[k] for row in rows], 0.66, label=label)
+        axes.bar_label(bars, fmt="%.0f", fontsize=7, padding=1)
+    axes.axhline(PRINTED_SECONDS * 1e6, color="k", ls="--", lw=1)
+    axes.text(8.75, PRINTED_SECONDS * 8.2e5, "mean printed in the paper", ha="right", va="top")
+    axes.set(yscale="log", ylim=(1, 4e5), xlabel="t", ylabel="time per point [µs]")
+    axes.set_xticks(TIMES)
+    axes.set_title("Time per point, called from Python on one core")
+    axes.legend(frameon=False, loc="center right")
+    save(figure, folder, "mahfoudi_12", ["t", "swarm_us", "exact_us"], rows)
+    mean = float(np.mean([row[1] for row in rows]))
+    printed = PRINTED_SECONDS * 1e6
+    print(f"path of section 3.3: {mean:.0f} us per point by swarm, printed {printed:.0f}")
+
+
 def table() -> None:
     """Print our platforms beside the printed ones, and say what cannot be reproduced."""
     known = readings()
@@ -179,7 +316,11 @@ def main() -> None:
     mpl.rcParams["font.size"] = 9
     figures_4_and_5(folder)
     figures_6_and_7(folder)
+    figure_8(folder)
+    figure_10(folder)
+    figure_11(folder)
     table()
+    figure_12(folder)
     print(f"\nfigures written to {folder}")
 
 

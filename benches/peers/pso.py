@@ -1,5 +1,10 @@
 """Particle swarms side by side: tdcr, pyswarms and scipy's differential evolution in one run.
 
+The first rows are what a user of tdcr calls: `PlanarTrunk.inverse(x, y, method="pso")`, objective
+and polish in Rust, called from Python; its answers are held against the same numpy function, in its
+time.
+Ratios are against the first row.
+
 The inverse of Mahfoudi, Amouri & Zaatri's planar trunk: sections of 140 and 120 mm, the path
 x = 260 - 15 t, y = 15 t mm, t = 0 ... 8; unknown are the two turns, within a full turn either way;
 the cost is the distance of the tip to the point. Everybody gets the same vectorised numpy function
@@ -20,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from tdcr import pso
+from tdcr import planar, pso
 
 LENGTHS = (0.140, 0.120)
 LOWER, UPPER = np.full(2, -2 * np.pi), np.full(2, 2 * np.pi)
@@ -28,8 +33,11 @@ TARGET = 1e-9
 PARTICLES, ITERATIONS = 30, 1000
 CHI = pso.PsoSettings().inertia
 
+TRUNK = planar.PlanarTrunk(LENGTHS, 0.01)
+
 Array = NDArray[np.float64]
 Cost = Callable[[Array], Array]
+Run = Callable[[Cost, tuple[float, float], int], None]
 
 
 class Reached(Exception):
@@ -67,20 +75,29 @@ def stopped(cost: Cost) -> Cost:
     return watched
 
 
-def by_tdcr(settings: pso.PsoSettings) -> Callable[[Cost, int], None]:
+def built_in(**options: object) -> Run:
+    """Run tdcr's own inverse of the trunk; the cost only checks its answer."""
+
+    def run(cost: Cost, point: tuple[float, float], seed: int) -> None:
+        cost(TRUNK.inverse(*point, method="pso", seed=seed, **options).turns[None])
+
+    return run
+
+
+def by_tdcr(settings: pso.PsoSettings) -> Run:
     """Run tdcr's swarm over the vectorised function."""
 
-    def run(cost: Cost, seed: int) -> None:
+    def run(cost: Cost, _: tuple[float, float], seed: int) -> None:
         settings_now = settings.replace(seed=seed)
         pso.minimize(cost, LOWER, UPPER, settings=settings_now, vectorized=True)
 
     return run
 
 
-def by_pyswarms(kind: type, options: dict[str, float], count: int) -> Callable[[Cost, int], None]:
+def by_pyswarms(kind: type, options: dict[str, float], count: int) -> Run:
     """Run one of the swarms of pyswarms."""
 
-    def run(cost: Cost, seed: int) -> None:
+    def run(cost: Cost, _: tuple[float, float], seed: int) -> None:
         np.random.seed(seed)  # noqa: NPY002 (what pyswarms draws from)
         swarm = kind(n_particles=count, dimensions=2, options=options, bounds=(LOWER, UPPER))
         swarm.optimize(cost, iters=ITERATIONS, verbose=False)
@@ -88,10 +105,10 @@ def by_pyswarms(kind: type, options: dict[str, float], count: int) -> Callable[[
     return run
 
 
-def by_evolution(**options: object) -> Callable[[Cost, int], None]:
+def by_evolution(**options: object) -> Run:
     """Run scipy's differential evolution, which wants points in columns."""
 
-    def run(cost: Cost, seed: int) -> None:
+    def run(cost: Cost, _: tuple[float, float], seed: int) -> None:
         bounds = list(zip(LOWER, UPPER, strict=True))
 
         def columns(turns: Array) -> Array | float:
@@ -105,7 +122,7 @@ def by_evolution(**options: object) -> Callable[[Cost, int], None]:
     return run
 
 
-def contenders() -> list[tuple[str, Callable[[Cost, int], None]]]:
+def contenders() -> list[tuple[str, Run]]:
     """Everybody by name; equal budget means 30 points and 1000 moves, without an earlier end."""
     # Its import begins a log file in the working directory.
     import pyswarms
@@ -116,7 +133,12 @@ def contenders() -> list[tuple[str, Callable[[Cost, int], None]]]:
     documented = {"c1": 0.5, "c2": 0.3, "w": 0.9}
     # Ring with one neighbour on either side: the three nearest, itself among them.
     globally, ring = pyswarms.single.GlobalBestPSO, pyswarms.single.LocalBestPSO
+    rough = {"polish": False, "tolerance": TARGET, "restarts": 0}
     return [
+        ("tdcr inverse, defaults", built_in()),
+        ("tdcr inverse, ring", built_in(settings=pso.PsoSettings(topology="ring"))),
+        ("tdcr inverse, points", built_in(objective="points")),
+        ("tdcr inverse, no polish", built_in(**rough)),
         ("tdcr, global", by_tdcr(pso.PsoSettings(**equal))),
         ("tdcr, ring", by_tdcr(pso.PsoSettings(topology="ring", **equal))),
         ("tdcr, spso2011", by_tdcr(pso.PsoSettings.spso2011(**equal))),
@@ -134,16 +156,17 @@ def contenders() -> list[tuple[str, Callable[[Cost, int], None]]]:
     ]
 
 
-def measure(run: Callable[[Cost, int], None], t: int, seeds: int) -> tuple[int, float]:
+def measure(run: Run, t: int, seeds: int) -> tuple[int, float]:
     """Return how many seeds reach a point of the path, and the mean seconds of a run.
 
     Seconds of the processor, which a busy machine does not stretch: everybody runs on one thread.
     """
-    cost = stopped(distance(0.260 - 0.015 * t, 0.015 * t))
+    point = (0.260 - 0.015 * t, 0.015 * t)
+    cost = stopped(distance(*point))
     hits, begin = 0, time.process_time()
     for seed in range(seeds):
         try:
-            run(cost, seed)
+            run(cost, point, seed)
         except Reached:
             hits += 1
     return hits, (time.process_time() - begin) / seeds
@@ -170,8 +193,10 @@ def main() -> None:
             first = first or mean
             if name == "tdcr, global":
                 assert min(hits for hits, _ in rows[1:]) >= 0.95 * seeds
+            if name == "tdcr inverse, defaults":
+                assert all(hits == seeds for hits, _ in rows)
             success = "".join(f"{100 * hits / seeds:5.0f}" for hits, _ in rows)
-            print(f"{name:28} {success} {mean * 1e3:13.2f} ms {mean / first:6.1f}", flush=True)
+            print(f"{name:28} {success} {mean * 1e3:13.3f} ms {mean / first:6.0f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -31,10 +31,14 @@ __all__ = [
     "_inverse_batch",
     "_inverse_solutions",
     "_planar_cable_lengths",
+    "_planar_clearance",
     "_planar_curve",
+    "_planar_inverse_defaults",
     "_planar_newton",
-    "_planar_newton_defaults",
+    "_planar_newton_batch",
     "_planar_platforms",
+    "_planar_swarm",
+    "_planar_swarm_batch",
     "_planar_trunk",
     "_planar_turns",
     "_pso_minimize",
@@ -496,6 +500,9 @@ def _planar_platforms(
 def _planar_curve(
     lengths: ArrayLike, cable_distance: float, given: ArrayLike, points: int
 ) -> _Array: ...
+def _planar_clearance(
+    lengths: ArrayLike, cable_distance: float, given: ArrayLike, obstacles: ArrayLike
+) -> float: ...
 def _planar_newton(
     lengths: ArrayLike,
     cable_distance: float,
@@ -505,9 +512,42 @@ def _planar_newton(
     limit: ArrayLike,
     tolerance: float,
     max_iterations: int,
-    starts: int,
+    starts: int | None,
 ) -> dict[str, Any]: ...
-def _planar_newton_defaults() -> dict[str, Any]: ...
+def _planar_newton_batch(
+    lengths: ArrayLike,
+    cable_distance: float,
+    points: ArrayLike,
+    heading: ArrayLike | None,
+    limit: ArrayLike,
+    tolerance: float,
+    max_iterations: int,
+    starts: int | None,
+    threads: int | None,
+    progress: Callable[[int], object] | None,
+) -> dict[str, Any]: ...
+def _planar_swarm(
+    lengths: ArrayLike,
+    cable_distance: float,
+    x: float,
+    y: float,
+    heading: float | None,
+    limit: ArrayLike,
+    keywords: dict[str, Any],
+    callback: Callable[[int, float], object] | None,
+) -> dict[str, Any]: ...
+def _planar_swarm_batch(
+    lengths: ArrayLike,
+    cable_distance: float,
+    points: ArrayLike,
+    heading: ArrayLike | None,
+    limit: ArrayLike,
+    keywords: dict[str, Any],
+    seed: int | Sequence[int] | NDArray[np.integer[Any]],
+    threads: int | None,
+    progress: Callable[[int], object] | None,
+) -> dict[str, Any]: ...
+def _planar_inverse_defaults() -> dict[str, Any]: ...
 def _angle_coefficients(s: ArrayLike, angles: ArrayLike) -> _Array: ...
 def _angle_at(s: ArrayLike, angles: ArrayLike, at: ArrayLike) -> _Array: ...
 def _angle_curve(

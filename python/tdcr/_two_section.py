@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from math import tau
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from tdcr import _core
+from tdcr._progress import told
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -78,7 +79,7 @@ def two_section_batch(
     limit: float = tau,
     *,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: bool | Callable[[int], object] = False,
 ) -> TwoSectionBatch:
     """Find every solution of many targets on all cores, with the GIL released.
 
@@ -90,8 +91,9 @@ def two_section_batch(
         One (x, y) per row [m].
     threads : int, optional
         Default: all cores. The answer does not depend on it.
-    progress : callable, optional
-        Gets the number of targets done about every 50 ms.
+    progress : bool or callable, optional
+        True draws a progress bar on a terminal; a callable gets the number of targets done about
+        every 50 ms.
 
     Returns
     -------
@@ -105,7 +107,9 @@ def two_section_batch(
     KeyboardInterrupt
         On Ctrl-C, within about 0.1 s.
     """
-    turns, counts = _core._two_section_batch(l1, l2, targets, limit, threads, progress)
+    total = len(targets) if isinstance(targets, Sized) else None
+    with told(progress, "two_section_batch", total) as tell:
+        turns, counts = _core._two_section_batch(l1, l2, targets, limit, threads, tell)
     row = np.repeat(np.arange(len(counts)), counts.astype(np.intp))
     row.flags.writeable = False
     return TwoSectionBatch(turns, row, counts)

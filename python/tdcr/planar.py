@@ -11,23 +11,27 @@ flexible continuum robot simulating elephant trunk" (2014); their theta is half 
 [[0.1654, 0.0955], [0.2404, 0.2254]]
 >>> planar.two_section_solutions(0.140, 0.120, 0.230, 0.030).round(6).tolist()
 [[-0.324743, 1.682972], [0.731936, -1.831385]]
->>> planar.PlanarTrunk([0.1, 0.1, 0.1], 0.01).inverse(0.2, 0.1).status
+>>> trunk = planar.PlanarTrunk([0.1, 0.1, 0.1], 0.01)
+>>> trunk.inverse(0.2, 0.1).status
 <Status.converged: 'converged'>
+>>> around = trunk.inverse(0.2, 0.1, method="pso", obstacles=[(0.1, 0.04, 0.02)])
+>>> around.status, around.clearance >= 0
+(<Status.converged: 'converged'>, True)
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import tau
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from tdcr import _core
 from tdcr._angle_function import AngleFunction, Curve, frozen
-from tdcr._status import Status
+from tdcr._planar_inverse import PlanarInverse, PlanarInverseBatch, Swarm, many, one
 from tdcr._two_section import (
     Nearest,
     TwoSectionBatch,
@@ -35,18 +39,21 @@ from tdcr._two_section import (
     two_section_nearest,
     two_section_solutions,
 )
-from tdcr.errors import InvalidInput, NotConverged
+from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from tdcr._core import PsoSettings
 
     Array = NDArray[np.float64]
 
 __all__ = [
     "AngleFunction",
     "Curve",
-    "Inverse",
     "Nearest",
+    "PlanarInverse",
+    "PlanarInverseBatch",
     "PlanarShape",
     "PlanarTrunk",
     "TwoSectionBatch",
@@ -95,6 +102,18 @@ class PlanarShape:
         """Bending energy for EI = 1, sum of turn**2/(2 length) [1/m]."""
         return float((self.turns**2 / np.array(self.trunk.lengths)).sum() / 2)
 
+    def clearance(self, obstacles: ArrayLike) -> float:
+        """Smallest distance of the axis from circles (x, y, radius), rows (k, 3) [m], exactly.
+
+        Negative where it enters one, infinite without any.
+
+        Raises
+        ------
+        InvalidInput
+            Another shape, NaN, a radius that is not positive.
+        """
+        return _core._planar_clearance(*self.trunk._given, self.turns, obstacles)
+
     def curve(self, points: int = 50) -> Curve:
         """Sample the exact arcs: `points` on every section, its two ends included.
 
@@ -131,61 +150,6 @@ class PlanarShape:
         """Tell turns and tip."""
         x, y = self.tip
         return f"<PlanarShape: turns {np.round(self.turns, 6).tolist()} rad, tip ({x:g}, {y:g}) m>"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Inverse:
-    """Turns that put the tip of a planar trunk on a target, or as near as can be.
-
-    Attributes
-    ----------
-    trunk : PlanarTrunk
-    turns : ndarray, shape (m,)
-        Turn of every section [rad].
-    error : float
-        Distance of the tip from the target [m].
-    heading_error : float
-        Direction of the tip against the heading asked for [rad]; 0 where none was.
-    energy : float
-        Bending energy for EI = 1, sum of turn**2/(2 length) [1/m].
-    status : Status
-        converged; unreachable, with the turns that come nearest; or iteration_limit.
-    method : str
-    iterations, starts : int
-        Newton steps of all starts, and how many were tried.
-    """
-
-    trunk: PlanarTrunk
-    turns: Array
-    error: float
-    heading_error: float
-    energy: float
-    status: Status
-    method: str
-    iterations: int
-    starts: int
-
-    @property
-    def ok(self) -> bool:
-        """Whether it converged."""
-        return self.status == Status.converged
-
-    @property
-    def shape(self) -> PlanarShape:
-        """The trunk at these turns."""
-        return self.trunk.shape(self.turns)
-
-    def require(self) -> Self:
-        """Return itself, or raise `NotConverged` where the target was not reached."""
-        if self.ok:
-            return self
-        message = f"{self.status}: the tip is {self.error:g} m from the target"
-        raise NotConverged(message, self)
-
-    def __repr__(self) -> str:
-        """Tell outcome and turns."""
-        turns = np.round(self.turns, 6).tolist()
-        return f"<Inverse: {self.status}, turns {turns} rad, error {self.error:.1e} m>"
 
 
 @dataclass(frozen=True)
@@ -284,25 +248,34 @@ class PlanarTrunk:
         x: float,
         y: float,
         *,
-        method: Literal["newton"] = "newton",
+        method: Literal["newton", "pso"] = "newton",
         heading: float | None = None,
         limit: ArrayLike = tau,
         tolerance: float = 1e-12,
         max_iterations: int = 100,
-        starts: int = 16,
-    ) -> Inverse:
-        """Find the turns of least bending energy that put the tip on (x, y).
+        starts: int | None = None,
+        obstacles: ArrayLike = (),
+        objective: Literal["bends", "points"] = "bends",
+        settings: PsoSettings | None = None,
+        seed: int | None = None,
+        polish: bool = True,
+        restarts: int = 10,
+        callback: Callable[[int, float], object] | None = None,
+    ) -> PlanarInverse:
+        """Find turns that put the tip on (x, y).
 
-        Two sections without a heading have finitely many solutions, all of which are found. Other
-        numbers are solved from many starts: the exact solutions of the sections taken as two
-        groups, and turns spread over the limits, the same in every call.
+        Method "newton" finds the least bending energy of all: two sections without a heading have
+        finitely many solutions, all of which are found; other numbers are solved from many starts,
+        the same in every call. Method "pso" finds the least energy near where a particle swarm
+        leads, another one for another seed, and can keep out of obstacles.
 
         Parameters
         ----------
         x, y : float
             Target of the tip [m].
-        method : {"newton"}, optional
-            Newton's method on the least energy, from all starts.
+        method : {"newton", "pso"}, optional
+            Keywords from `obstacles` on are those of "pso", `starts` is that of "newton"; the other
+            method refuses them.
         heading : float, optional
             Direction of the tip [rad]; whole turns do not matter. Default: any.
         limit : float or array_like, shape (m,), optional
@@ -311,25 +284,96 @@ class PlanarTrunk:
             Miss of the target that counts as none [m]. A heading counts one trunk length per whole
             turn.
         max_iterations : int, optional
-            Newton steps per start at most.
+            Newton steps per start, or per polish, at most.
         starts : int, optional
-            Turns spread over the limits that are tried.
+            Turns spread over the limits that are tried. Default: 16.
+        obstacles : array_like, shape (k, 3), optional
+            Circles (x, y, radius) that the trunk's axis stays out of [m]. Newton's method then
+            brings every particle onto the target, and the swarm lowers the energy among these.
+        objective : {"bends", "points"}, optional
+            What the particles are: the turns, with the tip's miss as value; or the paper's
+            platforms between base and target, with the misses of the sections' lengths as value.
+        settings : PsoSettings, optional
+            The swarm; budgets are those of one swarm. Default: `PsoSettings()`, among obstacles
+            with topology "ring".
+        seed : int, optional
+            Default: that of the settings.
+        polish : bool, optional
+            Whether Newton's method takes over as soon as it reaches the target from the swarm's
+            best point. Without it the swarm itself has to come within `tolerance`.
+        restarts : int, optional
+            Further swarms at most, each with the next seed, as long as no answer is found.
+        callback : callable, optional
+            Gets the swarm's number of moves and best value after every move; the search ends with
+            what it has when it returns True.
 
         Returns
         -------
-        Inverse
-            `unreachable` where no start reaches the target: the nearest turns that were found.
+        PlanarInverse
+            `unreachable` where nothing reaches the target: the nearest turns that were found.
 
         Raises
         ------
         InvalidInput
             NaN, a limit outside (0, 2 pi], another number of limits than sections, settings out of
-            range, an unknown method.
+            range, an unknown method or objective, a keyword of the other method.
+        KeyboardInterrupt
+            On Ctrl-C during a search by swarm, within about 0.1 s.
         """
-        if method != "newton":
-            raise InvalidInput(f'method: expected "newton", got {method!r}', "method")
-        limits = np.atleast_1d(np.asarray(limit))
-        answer = _core._planar_newton(
-            *self._given, x, y, heading, limits, tolerance, max_iterations, starts
-        )
-        return Inverse(trunk=self, method=method, **answer)
+        swarm = Swarm(obstacles, objective, settings, seed, polish, restarts, callback)
+        newton = (tolerance, max_iterations, starts)
+        return one(self, (x, y, heading), method, limit, newton, swarm)
+
+    def inverse_batch(
+        self,
+        points: ArrayLike,
+        *,
+        method: Literal["newton", "pso"] = "newton",
+        heading: ArrayLike | None = None,
+        limit: ArrayLike = tau,
+        tolerance: float = 1e-12,
+        max_iterations: int = 100,
+        starts: int | None = None,
+        obstacles: ArrayLike = (),
+        objective: Literal["bends", "points"] = "bends",
+        settings: PsoSettings | None = None,
+        seed: int | Sequence[int] | NDArray[np.integer] | None = None,
+        polish: bool = True,
+        restarts: int = 10,
+        threads: int | None = None,
+        progress: bool | Callable[[int], object] = False,
+    ) -> PlanarInverseBatch:
+        """Find turns for many targets on all cores, with the GIL released.
+
+        Parameters
+        ----------
+        points : array_like, shape (B, 2)
+            One target (x, y) per row [m].
+        heading : float or array_like, shape (B,), optional
+            Direction of the tip, for all rows or for each [rad].
+        seed : int or array_like, shape (B,), optional
+            Seed of the first swarm, for all rows or for each. Default: that of the settings.
+        threads : int, optional
+            Default: all cores. The answer does not depend on it.
+        progress : bool or callable, optional
+            True draws a progress bar on a terminal; a callable gets the number of rows done about
+            every 50 ms.
+        method, limit, tolerance, max_iterations, starts, obstacles, objective, settings, polish, \
+        restarts
+            As for `inverse`.
+
+        Returns
+        -------
+        PlanarInverseBatch
+            Every row in its place, the same as alone.
+
+        Raises
+        ------
+        InvalidInput
+            As `inverse`, naming the row; a number of threads below 1.
+        KeyboardInterrupt
+            On Ctrl-C, within about 0.1 s.
+        """
+        swarm = Swarm(obstacles, objective, settings, seed, polish, restarts)
+        newton = (tolerance, max_iterations, starts)
+        return many(self, points, heading, method, limit, newton, swarm, threads, progress)

@@ -228,8 +228,9 @@ def test_objects_are_values():
 
 def test_defaults_are_those_of_the_core():
     parameters = inspect.signature(planar.PlanarTrunk.inverse).parameters
-    for name, value in _core._planar_newton_defaults().items():
-        assert parameters[name].default == value
+    batch = inspect.signature(planar.PlanarTrunk.inverse_batch).parameters
+    for name, value in _core._planar_inverse_defaults().items():
+        assert parameters[name].default == batch[name].default == value
 
 
 @pytest.mark.parametrize(

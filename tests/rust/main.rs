@@ -20,6 +20,8 @@ mod linkage_drive;
 mod linkage_random;
 mod optimality;
 mod planar_inverse;
+mod planar_obstacles;
+mod planar_swarm;
 mod planar_trunk;
 mod planar_two_section;
 mod pso;

@@ -16,6 +16,7 @@ mod forward;
 mod inverse;
 mod long_call;
 mod planar;
+mod planar_inverse;
 mod pso;
 mod pso_settings;
 mod robot;
@@ -43,8 +44,13 @@ mod _core {
     #[pymodule_export]
     use crate::planar::{
         _angle_at, _angle_coefficients, _angle_curve, _planar_cable_lengths, _planar_curve,
-        _planar_newton, _planar_newton_defaults, _planar_platforms, _planar_trunk, _planar_turns,
-        _two_section_batch, _two_section_nearest, _two_section_solutions,
+        _planar_platforms, _planar_trunk, _planar_turns, _two_section_batch, _two_section_nearest,
+        _two_section_solutions,
+    };
+    #[pymodule_export]
+    use crate::planar_inverse::{
+        _planar_clearance, _planar_inverse_defaults, _planar_newton, _planar_newton_batch,
+        _planar_swarm, _planar_swarm_batch,
     };
     #[pymodule_export]
     use crate::pso::_pso_minimize;

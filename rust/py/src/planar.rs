@@ -1,22 +1,18 @@
 //! The functions behind `tdcr.planar`; its docstrings are in Python.
 
-use nalgebra::Vector2;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use tdcr::InvalidInput;
 use tdcr::batch::pool;
-use tdcr::planar::{
-    AngleFunction, Cables, Goal, InverseSettings, Trunk, TwoSections, inverse, solve_many,
-};
+use tdcr::planar::{AngleFunction, Cables, Trunk, TwoSections, solve_many};
 
 use crate::arguments::{number, optional, text, whole};
-use crate::convert::{float_array, frozen, invalid, status, values, wrong_shape};
+use crate::convert::{float_array, frozen, invalid, values, wrong_shape};
 use crate::long_call;
 
 /// A one-dimensional array of numbers, or one number.
-fn row(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+pub(crate) fn row(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let array = float_array(argument, value)?;
     if array.shape().len() > 1 {
         return Err(wrong_shape(argument, "a sequence of numbers", array.shape()));
@@ -25,7 +21,11 @@ fn row(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 }
 
 /// Rows of two numbers.
-fn pairs(argument: &str, value: &Bound<'_, PyAny>, rows: &str) -> PyResult<Vec<[f64; 2]>> {
+pub(crate) fn pairs(
+    argument: &str,
+    value: &Bound<'_, PyAny>,
+    rows: &str,
+) -> PyResult<Vec<[f64; 2]>> {
     let array = float_array(argument, value)?;
     if array.shape().len() != 2 || array.shape()[1] != 2 {
         let expected = format!("an array of shape ({rows}, 2)");
@@ -38,13 +38,16 @@ fn flat<const N: usize>(rows: impl IntoIterator<Item = [f64; N]>) -> Vec<f64> {
     rows.into_iter().flatten().collect()
 }
 
-fn trunk(lengths: &Bound<'_, PyAny>, cable_distance: &Bound<'_, PyAny>) -> PyResult<Trunk> {
+pub(crate) fn trunk(
+    lengths: &Bound<'_, PyAny>,
+    cable_distance: &Bound<'_, PyAny>,
+) -> PyResult<Trunk> {
     let distance = number("cable_distance", cable_distance)?;
     Trunk::new(row("lengths", lengths)?, distance).map_err(|e| invalid(&e))
 }
 
 /// Turns that fit the trunk.
-fn turns(trunk: &Trunk, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+pub(crate) fn turns(trunk: &Trunk, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let turns = row("turns", value)?;
     trunk.check_turns(&turns).map_err(|e| invalid(&e))?;
     Ok(turns)
@@ -68,7 +71,7 @@ fn two_sections(
 }
 
 /// A coordinate of a target.
-fn coordinate(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+pub(crate) fn coordinate(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     let number = number(argument, value)?;
     if number.is_finite() {
         return Ok(number);
@@ -206,56 +209,6 @@ pub(crate) fn _angle_curve(
         frozen(py, curve.headings, &[k])?,
         curve.error,
     ))
-}
-
-/// The Newton inverse as a dict of the fields of `tdcr.planar.Inverse`.
-#[pyfunction]
-#[allow(clippy::too_many_arguments)] // The keywords of PlanarTrunk.inverse.
-pub(crate) fn _planar_newton<'py>(
-    py: Python<'py>,
-    lengths: &Bound<'py, PyAny>,
-    cable_distance: &Bound<'py, PyAny>,
-    x: &Bound<'py, PyAny>,
-    y: &Bound<'py, PyAny>,
-    heading: Option<&Bound<'py, PyAny>>,
-    limit: &Bound<'py, PyAny>,
-    tolerance: f64,
-    max_iterations: &Bound<'py, PyAny>,
-    starts: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let trunk = trunk(lengths, cable_distance)?;
-    let goal = Goal {
-        point: Vector2::new(coordinate("x", x)?, coordinate("y", y)?),
-        heading: optional("heading", heading, number)?,
-        limits: row("limit", limit)?,
-    };
-    let settings = InverseSettings {
-        tolerance,
-        max_iterations: whole("max_iterations", max_iterations)?,
-        starts: whole("starts", starts)?,
-    };
-    let found = py.detach(|| inverse(&trunk, &goal, &settings)).map_err(|e| invalid(&e))?;
-    let answer = PyDict::new(py);
-    let m = found.turns.len();
-    answer.set_item("turns", frozen(py, found.turns, &[m])?)?;
-    answer.set_item("error", found.error)?;
-    answer.set_item("heading_error", found.heading_error)?;
-    answer.set_item("energy", found.energy)?;
-    answer.set_item("status", status(py, found.status)?)?;
-    answer.set_item("iterations", found.iterations)?;
-    answer.set_item("starts", found.starts)?;
-    Ok(answer)
-}
-
-/// Defaults of the Newton inverse in the core, for the test that compares them with Python's.
-#[pyfunction]
-pub(crate) fn _planar_newton_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    let settings = InverseSettings::default();
-    let values = PyDict::new(py);
-    values.set_item("tolerance", settings.tolerance)?;
-    values.set_item("max_iterations", settings.max_iterations)?;
-    values.set_item("starts", settings.starts)?;
-    Ok(values)
 }
 
 /// Every solution (S, 2) of one target.

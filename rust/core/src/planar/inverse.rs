@@ -128,21 +128,21 @@ pub fn polish(
 }
 
 /// The problem, its buffers and the best answers so far.
-struct Solver<'a> {
-    problem: Problem,
-    heading: Option<f64>,
-    whole: f64,
-    settings: &'a InverseSettings,
-    work: Work,
-    iterations: usize,
+pub(super) struct Solver<'a> {
+    pub(super) problem: Problem,
+    pub(super) heading: Option<f64>,
+    pub(super) whole: f64,
+    pub(super) settings: &'a InverseSettings,
+    pub(super) work: Work,
+    pub(super) iterations: usize,
     /// Energy, whether it is stationary, turns.
-    best: Option<(f64, bool, Vec<f64>)>,
+    pub(super) best: Option<(f64, bool, Vec<f64>)>,
     /// Miss, whether it is stationary, turns.
     nearest: Option<(f64, bool, Vec<f64>)>,
 }
 
 impl<'a> Solver<'a> {
-    fn new(
+    pub(super) fn new(
         trunk: &Trunk,
         goal: &Goal,
         settings: &'a InverseSettings,
@@ -180,7 +180,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Sections in two groups of one curvature each: every exact solution.
-    fn exact_starts(&self) -> Vec<Vec<f64>> {
+    pub(super) fn exact_starts(&self) -> Vec<Vec<f64>> {
         let lengths = &self.problem.lengths;
         let (mut starts, mut found) = (Vec::new(), Vec::new());
         for split in 1..lengths.len() {
@@ -232,13 +232,13 @@ impl<'a> Solver<'a> {
     }
 
     /// Whole turns of the heading do not matter: those nearest to a start's are taken.
-    fn unwind(&mut self, start: &[f64]) {
+    pub(super) fn unwind(&mut self, start: &[f64]) {
         let turn = std::f64::consts::TAU;
         let sum: f64 = start.iter().sum();
         self.problem.heading = self.heading.map(|h| h + turn * ((sum - h) / turn).round());
     }
 
-    fn try_start(&mut self, start: &[f64]) {
+    pub(super) fn try_start(&mut self, start: &[f64]) {
         self.unwind(start);
         let mut turns = start.to_vec();
         self.work.held.clear();
@@ -259,7 +259,7 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn try_nearest(&mut self, start: &[f64]) {
+    pub(super) fn try_nearest(&mut self, start: &[f64]) {
         self.unwind(start);
         let mut turns = start.to_vec();
         let (miss, flat) = self.problem.approach(&mut turns, &mut self.work);
@@ -268,7 +268,7 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn answer(mut self, starts: usize) -> Inverse {
+    pub(super) fn answer(mut self, starts: usize) -> Inverse {
         let (converged, settled, turns) = match (self.best.take(), self.nearest.take()) {
             (Some((_, settled, turns)), _) => (true, settled, turns),
             (None, Some((_, settled, turns))) => (false, settled, turns),

@@ -1,12 +1,15 @@
-//! Two sections and many targets, on all cores.
+//! Many targets, on all cores.
 
 use std::sync::atomic::Ordering;
 
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::inverse::{Goal, Inverse, InverseSettings, inverse};
+use super::trunk::Trunk;
 use super::two_section::TwoSections;
 use crate::batch::Control;
+use crate::error::InvalidInput;
 
 /// Solutions of many targets in one flat table.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,4 +60,28 @@ pub fn solve_many(
         whole.counts.extend(part.counts);
     }
     Some(whole)
+}
+
+/// The inverse of every goal, in their order whatever the number of threads. Returns `None` when it was
+/// stopped.
+///
+/// # Errors
+/// As [`inverse`], for the first row that has any.
+pub fn inverse_rows(
+    trunk: &Trunk,
+    goals: &[Goal],
+    settings: &InverseSettings,
+    pool: &ThreadPool,
+    control: &Control,
+) -> Result<Option<Vec<Inverse>>, InvalidInput> {
+    let job = |goal: &Goal| {
+        if control.stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        let answer = inverse(trunk, goal, settings)?;
+        control.done.fetch_add(1, Ordering::Relaxed);
+        Ok(Some(answer))
+    };
+    // None of a row that was stopped makes the whole None.
+    pool.install(|| goals.par_iter().map(job).collect())
 }

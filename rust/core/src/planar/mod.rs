@@ -3,20 +3,25 @@
 //!
 //! x along the undeformed trunk, y to its left; a turn is the whole angle of a section (the paper's
 //! `2 theta`), counter-clockwise. [`Trunk`] and [`AngleFunction`] are the direct model, [`TwoSections`]
-//! finds every solution of two sections, [`inverse`] the one of least bending energy of any number.
+//! finds every solution of two sections, [`inverse`] the one of least bending energy of any number,
+//! [`SwarmSolver`] one by particle swarm, among obstacles too.
 
 mod chord;
+mod clearance;
 mod inverse;
 mod least_energy;
 mod many;
 mod nearest;
 mod problem;
 mod spline;
+mod swarm;
 mod trunk;
 mod two_section;
 
+pub use clearance::Circle;
 pub use inverse::{Goal, Inverse, InverseSettings, inverse, polish};
-pub use many::{ManySolutions, solve_many};
+pub use many::{ManySolutions, inverse_rows, solve_many};
 pub use spline::{AngleFunction, Curve};
+pub use swarm::{Row, Rows, SwarmInverse, SwarmSettings, SwarmSolver, Unknowns, Word, solve_rows};
 pub use trunk::{Bent, Cables, Trunk};
 pub use two_section::TwoSections;

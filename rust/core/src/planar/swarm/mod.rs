@@ -1,0 +1,96 @@
+//! The inverse by particle swarm: any number of sections, headings, limits, circles to stay out of.
+//!
+//! A swarm looks for the neighbourhood of an answer, Newton's method ends it. Unknown are the turns of
+//! the sections, whose lengths then hold by construction, or, as in the paper, the platforms between
+//! them, with the lengths as penalties. `docs/planar.md` has the mathematics.
+
+mod answer;
+mod hunt;
+mod many;
+mod search;
+mod value;
+
+pub use answer::SwarmInverse;
+pub use many::{Row, Rows, solve_rows};
+pub use search::{SwarmSolver, Word};
+
+use super::inverse::InverseSettings;
+use crate::error::InvalidInput;
+use crate::solve::pso::PsoSettings;
+
+/// What the particles are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Unknowns {
+    /// The turns of the sections; the value is the distance of the tip from the target.
+    #[default]
+    Bends,
+    /// The paper's: the platforms between base and target; the value is how far the arcs through them
+    /// are from the sections' lengths.
+    Points,
+}
+
+impl Unknowns {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Bends, Self::Points];
+
+    /// The name used in Python.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Bends => "bends",
+            Self::Points => "points",
+        }
+    }
+}
+
+/// The swarm and what follows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SwarmSettings {
+    /// The swarm; its budgets are those of one swarm. Its seed is that of the first.
+    pub swarm: PsoSettings,
+    /// What the particles are.
+    pub unknowns: Unknowns,
+    /// Whether Newton's method takes over from the swarm, tries its best points on the way, and brings
+    /// the answer to `tolerance` and the least bending energy nearby.
+    pub polish: bool,
+    /// Miss of the target that counts as none \[m\]; a heading counts one trunk length per whole turn.
+    pub tolerance: f64,
+    /// Newton steps per polish at most.
+    pub max_iterations: usize,
+    /// Further swarms, each with the next seed, where one found no answer.
+    pub restarts: usize,
+}
+
+impl Default for SwarmSettings {
+    fn default() -> Self {
+        let InverseSettings { tolerance, max_iterations, .. } = InverseSettings::default();
+        Self {
+            swarm: PsoSettings::default(),
+            unknowns: Unknowns::default(),
+            polish: true,
+            tolerance,
+            max_iterations,
+            restarts: 10,
+        }
+    }
+}
+
+impl SwarmSettings {
+    /// Refuses settings out of range.
+    ///
+    /// # Errors
+    /// `InvalidInput` that names the field.
+    pub fn validate(&self) -> Result<(), InvalidInput> {
+        self.swarm.validate()?;
+        self.newton().validate()?;
+        if self.restarts > 10_000 {
+            return Err(InvalidInput::new("restarts", "0 to 10000", self.restarts));
+        }
+        Ok(())
+    }
+
+    pub(super) fn newton(&self) -> InverseSettings {
+        let Self { tolerance, max_iterations, .. } = *self;
+        InverseSettings { tolerance, max_iterations, ..InverseSettings::default() }
+    }
+}
