@@ -40,11 +40,11 @@ class _Value:
     model: str
 
     def __eq__(self, other: object) -> bool:
-        """Compare by value: the same robot, target, choices and answer."""
+        """Compare by value: the same robot, target, choices and answer, but for its message."""
         if type(other) is not type(self):
             return NotImplemented
-        names = [field.name for field in fields(self) if field.name != "message"]  # type: ignore[arg-type]
-        return all(_same(getattr(self, name), getattr(other, name)) for name in names)
+        mine, theirs = self.__getstate__(), other.__getstate__()
+        return all(_same(mine[name], theirs[name]) for name in mine if name != "message")
 
     def __hash__(self) -> int:
         """Hash by robot and displacements."""

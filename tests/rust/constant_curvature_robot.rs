@@ -210,7 +210,7 @@ fn overflow_is_told() {
         let settings = ConstantCurvatureSettings { extensible, ..Default::default() };
         let plan = Plan::new(&three, settings).unwrap();
         let model = ConstantCurvature::new(&three, &plan);
-        for given in [[1e308, -1e308, 0.0], [f64::MAX; 3], [1e200, 0.0, 0.0]] {
+        for given in [[1e308, -1e308, 0.0], [f64::MAX, f64::MAX, 0.0], [1e200, 0.0, 0.0]] {
             let shape = model.shape(&given).unwrap();
             assert_eq!(shape.report.status, Status::NumericalError, "{given:?}");
             assert!(shape.message.contains("segment 0 overflow"), "{}", shape.message);

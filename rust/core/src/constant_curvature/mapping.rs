@@ -108,8 +108,8 @@ impl Mapping {
         Ok(Fit { arc, residual, condition })
     }
 
-    /// [`Mapping::fit`] for one row of many: keeps the inverse of the last pattern of tendons, and
-    /// appends the residual.
+    /// [`Mapping::fit`] for one row of many: keeps the inverse of the last pattern of tendons (of this
+    /// mapping only), and appends the residual.
     ///
     /// # Errors
     /// As [`Mapping::fit`].
@@ -134,13 +134,13 @@ impl Mapping {
         let unknowns = pattern.solve(self, known.is_none(), |k| displacements[k] - elongation);
         let bend = Vector2::new(unknowns[0], unknowns[1]) / self.scale;
         let arc = Arc { bend, length: known.unwrap_or(self.rest_length + unknowns[2]) };
+        if arc.is_finite() && arc.length <= 0.0 {
+            let expected = "displacements that leave the segment a length";
+            return Err(InvalidInput::new("displacements", expected, format!("{} m", arc.length)));
+        }
         if !(arc.is_finite() && arc.kappa().is_finite()) {
             let expected = "displacements small enough to compute an arc";
             return Err(InvalidInput::new("displacements", expected, "an overflow"));
-        }
-        if arc.length <= 0.0 {
-            let expected = "displacements that leave the segment a length";
-            return Err(InvalidInput::new("displacements", expected, format!("{} m", arc.length)));
         }
         let first = residual.len();
         residual.resize(first + self.tendons(), 0.0);
