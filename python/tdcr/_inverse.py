@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Sized
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from tdcr import _core
-from tdcr._core import InverseSettings
+from tdcr._core import Bounds, InverseSettings
+from tdcr._inverse_results import Inverse, InverseBatch
 from tdcr._progress import told
-from tdcr._status import Status
-from tdcr.errors import NotConverged
+from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    from tdcr._core import Bounds, ConstantCurvatureSettings, LinkageSettings, Robot, Shape
+    from tdcr._core import Robot, Shape
+    from tdcr._inverse_results import Array, Method, Settings
 
-    Settings: TypeAlias = LinkageSettings | ConstantCurvatureSettings
     BoundsLike: TypeAlias = Bounds | tuple[ArrayLike, ArrayLike]
-    Array: TypeAlias = NDArray[np.float64]
-    Method: TypeAlias = Literal["newton", "pso"]
 
 __all__ = [
     "Inverse",
@@ -33,146 +29,6 @@ __all__ = [
     "inverse_solutions",
     "track",
 ]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Inverse:
-    """Displacements that bring the tool to a target, and how it went. Arrays are read-only."""
-
-    robot: Robot
-    target: Array
-    """A position (3,) or a frame (4, 4), world frame [m]."""
-    displacements: Array
-    """Tendon displacements, (K,) [m]: negative pulls."""
-    status: Status
-    """converged: the target is met, with the least bending energy nearby where there is freedom;
-    unreachable: the nearest answer that was found; infeasible: the bounds exclude each other;
-    iteration_limit, numerical_error: stopped before either."""
-    message: str
-    """What stood in the way; empty when it converged."""
-    error: float
-    """Distance from the tool to the target, over the axes that count [m]."""
-    rotation_error: float
-    """Angle from the tool to the target, over the axes that count [rad]; 0 for a position."""
-    iterations: int
-    """Steps taken from all starts."""
-    starts: int
-    """Starts tried."""
-    model: str
-    settings: Settings | None
-    bounds: BoundsLike | None
-    search: InverseSettings
-    method: Method
-    hits: int = 1
-    """How many starts led to this answer (`inverse_solutions`)."""
-
-    @property
-    def ok(self) -> bool:
-        """Whether it converged."""
-        return self.status is Status.converged
-
-    @cached_property
-    def shape(self) -> Shape:
-        """The robot under the displacements."""
-        return _core.forward(
-            self.robot, self.displacements, model=self.model, settings=self.settings
-        )
-
-    def require(self) -> Inverse:
-        """Return the result itself, or raise `NotConverged` with its message."""
-        if self.ok:
-            return self
-        raise NotConverged(f"{self.status}: {self.message}", self)
-
-    def __eq__(self, other: object) -> bool:
-        """Compare by value: the same robot, target, choices and answer."""
-        if not isinstance(other, Inverse):
-            return NotImplemented
-        mine, theirs = (
-            (a.robot, a.status, a.model, a.settings, a.search, a.method, a.hits)
-            for a in (self, other)
-        )
-        return (
-            mine == theirs
-            and np.array_equal(self.target, other.target)
-            and np.array_equal(self.displacements, other.displacements)
-        )
-
-    def __hash__(self) -> int:
-        """Hash by robot and displacements."""
-        return hash((self.robot, self.model, self.displacements.tobytes()))
-
-    def __repr__(self) -> str:
-        """Tell the outcome and the displacements."""
-        pulls = np.array2string(
-            self.displacements, precision=6, separator=", ", threshold=12, max_line_width=1000
-        )
-        off = f"{self.error:.3g} m"
-        if self.target.shape == (4, 4):
-            off += f", {self.rotation_error:.3g} rad"
-        return f"<Inverse {self.status}, {off} off, displacements {pulls}>"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class InverseBatch(Sequence[Inverse]):
-    """Inverses of one robot, in the order of their targets; `batch[i]` is an `Inverse`."""
-
-    robot: Robot
-    targets: Array
-    """Positions (B, 3) or frames (B, 4, 4), world frame [m]."""
-    displacements: Array
-    """Tendon displacements, (B, K) [m]."""
-    status: NDArray[Any]
-    """`Status` of every row, (B,)."""
-    ok: NDArray[np.bool_]
-    """Whether the row converged, (B,)."""
-    error: Array
-    """Distances to the targets, (B,) [m]."""
-    rotation_error: Array
-    """Angles to the targets, (B,) [rad]."""
-    iterations: NDArray[np.uint64]
-    """Steps taken, (B,)."""
-    starts: NDArray[np.uint64]
-    """Starts tried, (B,). Along a path 1 means that the row went on from the one before; more, that
-    this failed and the answer may be far from it."""
-    model: str
-    settings: Settings | None
-    bounds: BoundsLike | None
-    search: InverseSettings
-    method: Method
-
-    def __len__(self) -> int:
-        """Return the number of targets B."""
-        return len(self.targets)
-
-    def __getitem__(self, index: Any) -> Any:
-        """Return the inverse of one target, or a list of them for a slice."""
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        i = range(len(self))[index]
-        ok = bool(self.ok[i])
-        off = f"{self.error[i]:.6f} m and {self.rotation_error[i]:.6f} rad off the target"
-        return Inverse(
-            self.robot,
-            self.targets[i],
-            self.displacements[i],
-            self.status[i],
-            "" if ok else f"row {i} is {off} after {self.starts[i]} starts",
-            float(self.error[i]),
-            float(self.rotation_error[i]),
-            int(self.iterations[i]),
-            int(self.starts[i]),
-            self.model,
-            self.settings,
-            self.bounds,
-            self.search,
-            self.method,
-        )
-
-    def __repr__(self) -> str:
-        """Tell size and outcome."""
-        converged = int(np.count_nonzero(self.ok))
-        return f"<InverseBatch of {len(self)} targets, {converged} converged, model {self.model!r}>"
 
 
 def inverse(
@@ -232,6 +88,7 @@ def inverse(
     (<Status.converged: 'converged'>, [-2.0, -2.0, 4.0])
     """
     search = InverseSettings() if search is None else search
+    bounds = _bounds(bounds)
     row = _core._inverse(
         robot, target, model, _displacements(start), bounds, settings, search, method
     )
@@ -252,7 +109,9 @@ def inverse_solutions(
 
     All ``search.starts`` starts are tried. An answer to which several of them lead (`hits`) is
     seldom the last one to be found: when some have a single hit, try more starts. Where the target
-    leaves freedom, these are the least-energy answers of different branches.
+    leaves freedom, these are the least-energy answers of different branches. A target on the axis
+    of the base has continua of answers where the robot may turn about it: every start then finds
+    another one, the hits are 1 however many starts are tried, and the list is a sample.
 
     Parameters
     ----------
@@ -265,6 +124,7 @@ def inverse_solutions(
         Empty when none meets the target.
     """
     search = InverseSettings() if search is None else search
+    bounds = _bounds(bounds)
     rows = _core._inverse_solutions(robot, target, model, bounds, settings, search, method)
     fixed = _frozen(target)
     return [
@@ -278,7 +138,7 @@ def inverse_batch(
     targets: ArrayLike,
     *,
     model: str,
-    start: ArrayLike | None = None,
+    start: ArrayLike | Inverse | InverseBatch | Shape | None = None,
     method: Method = "newton",
     bounds: BoundsLike | None = None,
     settings: Settings | None = None,
@@ -294,7 +154,7 @@ def inverse_batch(
         As for `inverse`.
     targets : array_like, shape (B, 3) or (B, 4, 4)
         One target per row [m].
-    start : array_like, shape (K,) or (B, K), optional
+    start : array_like of shape (K,) or (B, K), Inverse, InverseBatch or Shape, optional
         Displacements to try first, for all rows or for each [m].
     threads : int, optional
         Default: all cores. The answer does not depend on it.
@@ -314,7 +174,12 @@ def inverse_batch(
     KeyboardInterrupt
         On Ctrl-C, within about 0.1 s.
     """
-    options = {"start": start, "threads": threads, "chain": False, "method": method}
+    options = {
+        "start": _displacements(start),
+        "threads": threads,
+        "chain": False,
+        "method": method,
+    }
     return _many(robot, targets, model, bounds, settings, search, progress, options)
 
 
@@ -374,8 +239,14 @@ def _many(
     options: dict[str, Any],
 ) -> InverseBatch:
     search = InverseSettings() if search is None else search
+    bounds = _bounds(bounds)
     name = "track" if options["chain"] else "inverse_batch"
-    with told(progress, name, len(targets) if isinstance(targets, Sized) else None) as tell:
+    try:
+        count = len(targets)  # type: ignore[arg-type]
+    except TypeError:
+        # Of no length: the core says what is wrong.
+        count = None
+    with told(progress, name, count) as tell:
         columns = _core._inverse_batch(
             robot,
             targets,
@@ -396,6 +267,21 @@ def _many(
         search=search,
         method=options["method"],
     )
+
+
+def _bounds(bounds: BoundsLike | None) -> Bounds | None:
+    """Turn a pair of bounds on displacements into `Bounds`, which nobody can change."""
+    if bounds is None or isinstance(bounds, Bounds):
+        return bounds
+    try:
+        return Bounds(displacement=bounds)  # type: ignore[arg-type]  # Checked there.
+    except InvalidInput as error:
+        message = str(error).removeprefix("displacement")
+        argument = error.argument.removeprefix("displacement")
+        raise InvalidInput(f"bounds{message}", f"bounds{argument}") from None
+    except TypeError as error:
+        message = str(error).removeprefix("displacement")
+        raise TypeError(f"bounds{message}") from None
 
 
 def _displacements(start: Any) -> Any:

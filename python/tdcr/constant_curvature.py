@@ -84,7 +84,7 @@ def arc_from_displacements(
     ell : float, optional
         Length of the extended segment [m]. Default: the rest length.
     extensible : bool, optional
-        Without `ell`: find the length too; at least three tendons must count.
+        Find the length too, instead of giving `ell`; at least three tendons must count.
 
     Returns
     -------
@@ -95,14 +95,15 @@ def arc_from_displacements(
     ------
     InvalidInput
         NaN, -inf, shapes that do not fit, a radius or length that is not positive, an unknown
-        length with fewer than three tendons that count, displacements that leave no length.
+        length with fewer than three tendons that count, displacements that leave no length or
+        overflow, `ell` together with `extensible`.
     """
-    rows = np.asarray(displacements)
+    rows = _array("displacements", displacements)
     batch = rows.ndim == 2
     columns = _core._arc_from_displacements(
         np.atleast_2d(rows) if rows.ndim == 1 else rows,
         azimuth,
-        np.atleast_1d(np.asarray(radius)),
+        np.atleast_1d(_array("radius", radius)),
         length,
         ell,
         extensible,
@@ -142,11 +143,12 @@ def displacements_from_arc(
     ------
     InvalidInput
         Parameters that are not finite, a negative curvature, lengths or radii that are not
-        positive, shapes that do not fit.
+        positive, angles and lengths above 1e150 rad or m, shapes that do not fit.
     """
-    single = np.ndim(kappa) == np.ndim(phi) == np.ndim(ell) == 0
+    kappa, phi, ell = _array("kappa", kappa), _array("phi", phi), _array("ell", ell)
+    single = kappa.ndim == phi.ndim == ell.ndim == 0
     answer: Array = _core._displacements_from_arc(
-        *_arcs(kappa, phi, ell), azimuth, np.atleast_1d(np.asarray(radius)), length
+        *_arcs(kappa, phi, ell), azimuth, np.atleast_1d(_array("radius", radius)), length
     )
     return answer[0] if single else answer
 
@@ -180,8 +182,8 @@ def frames(
     Raises
     ------
     InvalidInput
-        As `displacements_from_arc`, and for fewer than 2 points, a base that is no rigid motion, or
-        an unknown layout.
+        As `displacements_from_arc`, and for fewer than 2 points or more than fit into memory, a
+        base that is no rigid motion, or an unknown layout.
     """
     if layout not in ("homogeneous", "columns"):
         expected = '"homogeneous" or "columns"'
@@ -229,10 +231,22 @@ def jacobian(
 
 def _arcs(kappa: ArrayLike, phi: ArrayLike, ell: ArrayLike) -> tuple[Array, Array, Array]:
     """One value of each per arc; scalars serve all arcs."""
-    first, second, third = (np.atleast_1d(np.asarray(column)) for column in (kappa, phi, ell))
-    count = max(first.shape[0], second.shape[0], third.shape[0])
+    given = {"kappa": kappa, "phi": phi, "ell": ell}
+    columns = {name: np.atleast_1d(_array(name, value)) for name, value in given.items()}
+    count = max(column.shape[0] for column in columns.values())
+    for name, column in columns.items():
+        if count and not column.size:
+            raise InvalidInput(f"{name}: expected one value or one per arc, got none", name)
+    first, second, third = (
+        np.repeat(column, count) if column.shape == (1,) else column for column in columns.values()
+    )
+    return first, second, third
 
-    def full(column: Array) -> Array:
-        return np.repeat(column, count) if column.shape == (1,) else column
 
-    return full(first), full(second), full(third)
+def _array(argument: str, value: ArrayLike) -> NDArray[Any]:
+    """Make an array; the core checks what is in it."""
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        message = f"{argument}: expected a rectangular array of numbers, got {error}"
+        raise InvalidInput(message, argument) from None

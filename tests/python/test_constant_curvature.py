@@ -12,6 +12,9 @@ from tdcr import constant_curvature as cc
 EVEN = np.radians([0, 120, 240])
 
 
+OVERFLOW = [1e308, -1e308] + [0.0] * 7
+
+
 def robot(**keywords):
     ends = (10, 22, 30)
     tendons = [
@@ -191,6 +194,38 @@ def test_the_tip_jacobian_agrees_with_differences(settings, size):
         ("phi", lambda: cc.frames([1.0, 1.0], [0.0, 0.0, 0.0], 0.1)),
         ("ell", lambda: cc.frames(1.0, 0.0, 0.0)),
         ("points", lambda: cc.frames(1.0, 0.0, 0.1, points=1)),
+        (
+            "ell",
+            lambda: cc.arc_from_displacements([0, 0, 0], EVEN, 0.01, 0.1, ell=0.1, extensible=True),
+        ),
+        ("displacements", lambda: cc.arc_from_displacements([[0, 0], [0]], EVEN, 0.01, 0.1)),
+        ("radius", lambda: cc.arc_from_displacements([0, 0], [0, 1], [[0.1], []], 0.1)),
+        ("kappa", lambda: cc.displacements_from_arc([[1, 2], [3]], 0, 1, EVEN, 0.01)),
+        ("kappa", lambda: cc.displacements_from_arc(1e308, 0, 10, EVEN, 0.01)),
+        ("kappa", lambda: cc.displacements_from_arc(1e149, 0, 10, EVEN, 1e200)),
+        ("phi", lambda: cc.frames(1.0, [[0.0], [1.0, 2.0]], 0.1)),
+        ("kappa", lambda: cc.frames([], 0.0, 0.1)),
+        ("ell", lambda: cc.frames([1.0, 2.0], 0.0, [])),
+        ("kappa", lambda: cc.frames(1e308, 0.0, 10.0)),
+        ("kappa", lambda: cc.frames(1e151, 0.0, 1.0)),
+        ("kappa", lambda: cc.jacobian(1e308, 0.0, 10.0)),
+        ("ell", lambda: cc.jacobian(0.0, 0.0, 1e151)),
+        ("points", lambda: cc.frames(1.0, 0.0, 0.1, points=10**13)),
+        ("points", lambda: cc.frames(1.0, 0.0, 0.1, points=10**19)),
+        ("points", lambda: cc.frames([1.0] * 4, 0.0, 0.1, points=10**18)),
+        (
+            "displacements",
+            lambda: tdcr.jacobian(robot(), OVERFLOW, model="constant_curvature"),
+        ),
+        (
+            "displacements",
+            lambda: tdcr.jacobian(
+                robot(),
+                np.full(9, -1.0),
+                model="constant_curvature",
+                settings=tdcr.ConstantCurvatureSettings(extensible=True),
+            ),
+        ),
         ("layout", lambda: cc.frames(1.0, 0.0, 0.1, layout="rows")),
         ("base", lambda: cc.frames(1.0, 0.0, 0.1, base=2 * np.eye(4))),
         ("tool", lambda: cc.jacobian(1.0, 0.0, 0.1, tool=np.eye(3))),
@@ -221,6 +256,31 @@ def test_bad_input_names_the_argument(argument, call):
     with pytest.raises(tdcr.InvalidInput) as caught:
         call()
     assert caught.value.argument == argument
+
+
+def test_overflow_is_an_outcome():
+    shape = solve(robot(), OVERFLOW)
+    assert shape.status is tdcr.Status.numerical_error
+    assert "overflow" in shape.message
+    with pytest.raises(tdcr.InvalidInput, match="overflow"):
+        cc.arc_from_displacements([1e308, -1e308, 1e308], EVEN, 0.01, 0.1)
+
+
+def test_many_rows_equal_single_ones_and_bad_ones_are_named():
+    rng = np.random.default_rng(5)
+    given = rng.normal(scale=0.003, size=(20_000, 3))
+    given[rng.random(given.shape) < 0.1] = np.inf
+    arc = cc.arc_from_displacements(given, EVEN, 0.008, 0.1)
+    for i in range(0, 20_000, 997):
+        one = cc.arc_from_displacements(given[i], EVEN, 0.008, 0.1)
+        assert (one.kappa, one.phi, one.ell) == (arc.kappa[i], arc.phi[i], arc.ell[i])
+        assert np.array_equal(one.residual, arc.residual[i])
+    back = cc.displacements_from_arc(arc.kappa, arc.phi, arc.ell, EVEN, 0.008)
+    assert back.shape == given.shape
+    given[17_000, 1] = np.nan
+    with pytest.raises(tdcr.InvalidInput, match="row 17000") as caught:
+        cc.arc_from_displacements(given, EVEN, 0.008, 0.1)
+    assert caught.value.argument == "displacements"
 
 
 def test_doctests_run():

@@ -1,14 +1,27 @@
 //! The functions behind `tdcr.constant_curvature`; its docstrings are in Python.
 
+use std::sync::atomic::Ordering;
+
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
 use tdcr::InvalidInput;
-use tdcr::constant_curvature::{Arc, Length, Mapping, frames, tip_derivative};
+use tdcr::batch::Control;
+use tdcr::constant_curvature::{Arc, Length, Mapping, Pattern, frames, tip_derivative};
 use tdcr::lie::Pose;
 use tdcr::robot::rigid_motion;
 
-use crate::convert::{float_array, frozen, frozen_frames, invalid, matrix4, values, wrong_shape};
+use crate::convert::{float_array, frozen, invalid, matrix4, values, wrong_shape};
+use crate::long_call;
+
+/// Rows up to which a call ends soon enough to go without listening for Ctrl-C.
+const SOON: usize = 10_000;
+
+/// Rows from one look at the stop flag to the next.
+const STRIDE: usize = 256;
+
+/// Largest angle and length of an arc: their squares, and products with robots' lengths, are numbers.
+const LARGEST: f64 = 1e150;
 
 /// A one-dimensional array of finite numbers.
 fn row(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
@@ -38,8 +51,32 @@ fn arcs(
     };
     check("kappa", "finite curvatures of 0 or more [1/m]", &kappa, |k| k.is_finite() && k >= 0.0)?;
     check("phi", "finite angles [rad]", &phi, f64::is_finite)?;
-    check("ell", "positive finite lengths [m]", &ell, |l| l.is_finite() && l > 0.0)?;
+    check("ell", "positive lengths up to 1e150 m", &ell, |l| l > 0.0 && l <= LARGEST)?;
+    let angles: Vec<f64> = kappa.iter().zip(&ell).map(|(k, l)| k * l).collect();
+    check("kappa", "curvatures with kappa * ell up to 1e150 rad", &angles, |a| a <= LARGEST)?;
     Ok((kappa.iter().zip(&phi).zip(&ell)).map(|((k, p), l)| Arc::new(*k, *p, *l)).collect())
+}
+
+/// Refuses what overflowed.
+fn check_overflow(argument: &str, answer: &[f64]) -> PyResult<()> {
+    if answer.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    let expected = "a value small enough to compute with";
+    Err(invalid(&InvalidInput::new(argument, expected, "one that overflows")))
+}
+
+/// Runs a job without the GIL; a long one listens for Ctrl-C.
+fn run<T: Send>(
+    py: Python<'_>,
+    rows: usize,
+    job: impl FnOnce(&Control) -> T + Send,
+) -> PyResult<T> {
+    if rows > SOON {
+        long_call::run(py, None, job)
+    } else {
+        Ok(py.detach(|| job(&Control::default())))
+    }
 }
 
 fn pose(argument: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
@@ -56,6 +93,33 @@ fn mapping(
 }
 
 type Columns = (Py<PyAny>, Py<PyAny>, Py<PyAny>, Py<PyAny>);
+
+/// (kappa, phi, ell) and residuals of rows of displacements, until told to stop.
+fn fit_rows(
+    mapping: &Mapping,
+    displacements: &[f64],
+    length: Length,
+    control: &Control,
+) -> Result<([Vec<f64>; 3], Vec<f64>), InvalidInput> {
+    let columns = mapping.tendons();
+    let rows = displacements.len() / columns;
+    let mut parameters = [(); 3].map(|()| Vec::with_capacity(rows));
+    let mut residual = Vec::with_capacity(rows * columns);
+    let mut pattern = Pattern::default();
+    for (i, given) in displacements.chunks_exact(columns).enumerate() {
+        if i % STRIDE == 0 && control.stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let arc = mapping.fit_row(given, length, &mut pattern, &mut residual).map_err(|error| {
+            let place = if rows > 1 { format!(" in row {i}") } else { String::new() };
+            InvalidInput { got: error.got + &place, ..error }
+        })?;
+        for (column, value) in parameters.iter_mut().zip([arc.kappa(), arc.phi(), arc.length]) {
+            column.push(value);
+        }
+    }
+    Ok((parameters, residual))
+}
 
 /// (kappa (B,), phi (B,), ell (B,), residual (B, N)) of displacements (B, N).
 #[pyfunction]
@@ -78,21 +142,18 @@ pub(crate) fn _arc_from_displacements(
         return Err(invalid(&InvalidInput::new("displacements", expected, columns)));
     }
     let known = match (ell, extensible) {
-        (Some(ell), _) => Length::Known(ell),
+        (Some(ell), true) => {
+            let expected = "no length with extensible=True, which finds it: one of the two";
+            return Err(invalid(&InvalidInput::new("ell", expected, ell)));
+        }
+        (Some(ell), false) => Length::Known(ell),
         (None, true) => Length::Free,
         (None, false) => Length::Known(length),
     };
-    let mut parameters = [(); 3].map(|()| Vec::with_capacity(rows));
-    let mut residual = Vec::with_capacity(rows * columns);
-    for given in values(&array)?.chunks_exact(columns) {
-        let fit = mapping.fit(given, known).map_err(|e| invalid(&e))?;
-        let arc = fit.arc;
-        for (column, value) in parameters.iter_mut().zip([arc.kappa(), arc.phi(), arc.length]) {
-            column.push(value);
-        }
-        residual.extend(fit.residual);
-    }
-    let [kappa, phi, ell] = parameters;
+    let given = values(&array)?;
+    // Stopped only by an interrupt, which run has raised; what is missing then is never seen.
+    let fitted = run(py, rows, |control| fit_rows(&mapping, given, known, control))?;
+    let ([kappa, phi, ell], residual) = fitted.map_err(|e| invalid(&e))?;
     Ok((
         frozen(py, kappa, &[rows])?,
         frozen(py, phi, &[rows])?,
@@ -113,15 +174,21 @@ pub(crate) fn _displacements_from_arc(
     length: Option<f64>,
 ) -> PyResult<Py<PyAny>> {
     let arcs = arcs(kappa, phi, ell)?;
-    let mut mapping_of = mapping(azimuth, radius, length.unwrap_or(1.0))?;
-    let mut flat = Vec::with_capacity(arcs.len() * mapping_of.tendons());
-    for arc in &arcs {
-        if length.is_none() {
-            mapping_of = mapping(azimuth, radius, arc.length)?;
+    let mapping = mapping(azimuth, radius, length.unwrap_or(1.0))?;
+    let tendons = mapping.tendons();
+    let flat = run(py, arcs.len(), |control| {
+        let mut flat = Vec::with_capacity(arcs.len() * tendons);
+        for (i, arc) in arcs.iter().enumerate() {
+            if i % STRIDE == 0 && control.stop.load(Ordering::Relaxed) {
+                break;
+            }
+            let rest_length = length.unwrap_or(arc.length);
+            flat.extend((0..tendons).map(|k| mapping.displacement(k, arc, rest_length)));
         }
-        flat.extend(mapping_of.displacements(arc));
-    }
-    frozen(py, flat, &[arcs.len(), mapping_of.tendons()])
+        flat
+    })?;
+    check_overflow("kappa", &flat)?;
+    frozen(py, flat, &[arcs.len(), tendons])
 }
 
 /// Frames (m * points, 4, 4) along a chain of m arcs, base and tip of each included.
@@ -140,9 +207,23 @@ pub(crate) fn _arc_frames(
         let expected = "at least 2 frames per segment (base and tip)";
         return Err(invalid(&InvalidInput::new("points", expected, points)));
     }
-    let mut along = Vec::new();
-    frames(&pose("base", base)?, &arcs, points, &mut along);
-    frozen_frames(py, &along)
+    let base = pose("base", base)?;
+    let (mut along, mut flat) = (Vec::new(), Vec::<f64>::new());
+    let count = points.checked_mul(arcs.len()).filter(|count| {
+        let numbers = count.checked_mul(16);
+        numbers.is_some_and(|numbers| flat.try_reserve_exact(numbers).is_ok())
+            && along.try_reserve_exact(*count).is_ok()
+    });
+    let Some(count) = count else {
+        let expected = "as many frames per segment as fit into memory";
+        return Err(invalid(&InvalidInput::new("points", expected, points)));
+    };
+    py.detach(|| {
+        frames(&base, &arcs, points, &mut along);
+        flat.extend(along.iter().flat_map(Pose::to_row_major));
+    });
+    check_overflow("ell", &flat)?;
+    frozen(py, flat, &[count, 4, 4])
 }
 
 /// Derivative (6, 3m) of the tool's velocity by kappa, phi and ell of every arc.
@@ -163,5 +244,6 @@ pub(crate) fn _arc_jacobian(
         let block = matrix.fixed_columns::<3>(3 * i) * by;
         matrix.fixed_columns_mut::<3>(3 * i).copy_from(&block);
     }
+    check_overflow("kappa", matrix.as_slice())?;
     frozen(py, matrix.transpose().as_slice().to_vec(), &[6, 3 * chain.len()])
 }

@@ -100,7 +100,8 @@ pub(crate) fn forward(
 /// Raises
 /// ------
 /// InvalidInput
-///     As `forward`, and for a model without derivatives.
+///     As `forward`, for a model without derivatives, and for displacements that leave a segment no
+///     length or overflow.
 #[pyfunction]
 #[pyo3(signature = (robot, displacements, *, model, settings=None))]
 pub(crate) fn jacobian(
@@ -119,7 +120,8 @@ pub(crate) fn jacobian(
     solved.0.check_displacements(&displacements).map_err(|e| invalid(&e))?;
     let plan = solved.constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
     let matrix = ConstantCurvature::new(&solved.0, plan)
-        .jacobian(&displacements, &mut constant_curvature::Workspace::default());
+        .jacobian(&displacements, &mut constant_curvature::Workspace::default())
+        .map_err(|e| invalid(&e))?;
     // Columns of the transpose are the rows.
     frozen(py, matrix.transpose().as_slice().to_vec(), &[6, displacements.len()])
 }

@@ -29,6 +29,11 @@ impl Arc {
         self.bend.x.hypot(self.bend.y) / self.length
     }
 
+    /// Whether it has a length, and a bend whose square is a number: what frames and derivatives need.
+    pub(super) fn is_finite(&self) -> bool {
+        self.bend.norm_squared().is_finite() && self.length.is_finite()
+    }
+
     /// Azimuth of the bending plane \[rad\] in (-pi, pi]; 0 where the arc is straight.
     #[must_use]
     pub fn phi(&self) -> f64 {
@@ -56,14 +61,7 @@ impl Arc {
     /// and the length \[columns: m and rad per rad, per rad, per m\].
     #[must_use]
     pub fn derivative(&self) -> Matrix6x3<f64> {
-        let bent = Bent::new(self.bend);
-        let mut out = Matrix6x3::zeros();
-        for (j, (moved, turned)) in bent.moved().iter().zip(bent.turned()).enumerate() {
-            out.fixed_view_mut::<3, 1>(0, j).copy_from(&(moved * self.length));
-            out.fixed_view_mut::<3, 1>(3, j).copy_from(&turned);
-        }
-        out.fixed_view_mut::<3, 1>(0, 2).copy_from(&bent.end());
-        out
+        Bent::new(self.bend).derivative(self.length)
     }
 
     /// Derivative of the bending vector and the length by (kappa, phi, length).

@@ -4,7 +4,7 @@
 //! of `lie::so3`: with `a = sin t / t`, `b = (1 - cos t) / t²`, `c = (t - sin t) / t³` at the angle
 //! `t = |(x, y)|`, the arc ends at `(x b, y b, a)`.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Matrix6x3, Vector2, Vector3};
 
 use crate::lie::Pose;
 use crate::lie::coefficients::Angle;
@@ -66,6 +66,18 @@ impl Bent {
     #[inline(always)]
     pub(crate) fn frame(&self, length: f64) -> Pose {
         Pose { rotation: self.rotation(), translation: self.end() * length }
+    }
+
+    /// Velocity of the end of an arc of this length (translation, then rotation, base axes) by x, by y
+    /// and by the length.
+    pub(crate) fn derivative(&self, length: f64) -> Matrix6x3<f64> {
+        let mut out = Matrix6x3::zeros();
+        for (j, (moved, turned)) in self.moved().iter().zip(self.turned()).enumerate() {
+            out.fixed_view_mut::<3, 1>(0, j).copy_from(&(moved * length));
+            out.fixed_view_mut::<3, 1>(3, j).copy_from(&turned);
+        }
+        out.fixed_view_mut::<3, 1>(0, 2).copy_from(&self.end());
+        out
     }
 
     /// Derivatives of the end by x and by y.

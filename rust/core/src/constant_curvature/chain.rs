@@ -50,15 +50,14 @@ impl<'r> ConstantCurvature<'r> {
         Self { robot, plan }
     }
 
-    /// Fits the arcs; returns whether every segment keeps a length.
-    fn fit(&self, displacements: &[f64], work: &mut Workspace) -> bool {
+    /// Fits the arcs: infeasible when a segment keeps no length, a numerical error when one overflows.
+    fn fit(&self, displacements: &[f64], work: &mut Workspace) -> Status {
         let plan = self.plan;
         let width = plan.width();
         plan.counted(displacements, &mut work.counted);
         plan.remember(&work.counted, &mut work.masked);
         let inverse = plan.inverse_for(&work.counted, work.masked.as_ref());
         work.arcs.clear();
-        let mut sound = true;
         for (i, segment) in plan.segments.iter().enumerate() {
             let unknown = |row: usize| {
                 let counted = work.counted.iter().zip(displacements).enumerate();
@@ -69,15 +68,20 @@ impl<'r> ConstantCurvature<'r> {
             let bend = Vector2::new(unknown(0), unknown(1)) / plan.scale;
             let elongation = if plan.settings.extensible { unknown(2) } else { 0.0 };
             let length = segment.rest_length + elongation;
-            sound &= length > 0.0;
             work.arcs.push(Arc { bend, length });
         }
-        sound
+        if !work.arcs.iter().all(Arc::is_finite) {
+            Status::NumericalError
+        } else if work.arcs.iter().any(|arc| arc.length <= 0.0) {
+            Status::Infeasible
+        } else {
+            Status::Converged
+        }
     }
 
-    /// Places the disks, and measures tendons along their arcs.
-    fn place(&self, displacements: &[f64], work: &mut Workspace) {
-        let Workspace { state, arcs, misfit, counted, .. } = work;
+    /// Places the disks.
+    fn place(&self, work: &mut Workspace) {
+        let Workspace { state, arcs, .. } = work;
         state.clear();
         let mut base = *self.robot.base();
         state.frames.push(base);
@@ -106,6 +110,14 @@ impl<'r> ConstantCurvature<'r> {
                 *last = base;
             }
         }
+        let backbone = self.robot.backbone();
+        state.energy =
+            state.strains.iter().enumerate().map(|(i, w)| backbone.strain_energy(i, w)).sum();
+    }
+
+    /// Measures tendons along their arcs.
+    fn measure(&self, displacements: &[f64], work: &mut Workspace) {
+        let Workspace { state, arcs, misfit, counted, .. } = work;
         misfit.clear();
         for (k, path) in self.robot.paths().iter().enumerate() {
             let (mut whole, mut own) = (0.0, 0.0);
@@ -124,16 +136,23 @@ impl<'r> ConstantCurvature<'r> {
             misfit.push(if counted[k] { displacements[k] - fitted } else { 0.0 });
         }
         state.tensions.resize(displacements.len(), f64::NAN);
-        let backbone = self.robot.backbone();
-        state.energy =
-            state.strains.iter().enumerate().map(|(i, w)| backbone.strain_energy(i, w)).sum();
     }
 
     /// Velocity of the tool (translation, then rotation, world axes) per metre of displacement, (6, K),
-    /// at the arcs of the last solve. Tendons that do not count have zero columns.
-    #[must_use]
-    pub fn jacobian(&self, displacements: &[f64], work: &mut Workspace) -> Matrix6xX<f64> {
-        self.fit(displacements, work);
+    /// at checked displacements. Tendons that do not count have zero columns.
+    ///
+    /// # Errors
+    /// `InvalidInput` for displacements that leave a segment no length, or overflow.
+    pub fn jacobian(
+        &self,
+        displacements: &[f64],
+        work: &mut Workspace,
+    ) -> Result<Matrix6xX<f64>, InvalidInput> {
+        if self.fit(displacements, work) != Status::Converged {
+            let expected = "displacements that the segments can take";
+            let got = obstacle(&work.arcs).unwrap_or_default();
+            return Err(InvalidInput::new("displacements", expected, format!("some that {got}")));
+        }
         let width = self.plan.width();
         let by_arcs = tip_derivative(self.robot.base(), self.robot.tool(), &work.arcs);
         let mut by_unknowns = Matrix6xX::zeros(width * work.arcs.len());
@@ -145,8 +164,17 @@ impl<'r> ConstantCurvature<'r> {
                     .copy_from(&(by_arcs.column(3 * i + j) * scale));
             }
         }
-        by_unknowns * self.plan.inverse_for(&work.counted, work.masked.as_ref())
+        Ok(by_unknowns * self.plan.inverse_for(&work.counted, work.masked.as_ref()))
     }
+}
+
+/// What displacements do that gives arcs which no robot can take.
+fn obstacle(arcs: &[Arc]) -> Option<String> {
+    if let Some(i) = arcs.iter().position(|arc| !arc.is_finite()) {
+        return Some(format!("make the arc of segment {i} overflow"));
+    }
+    let i = arcs.iter().position(|arc| arc.length <= 0.0)?;
+    Some(format!("leave segment {i} no length"))
 }
 
 impl Model for ConstantCurvature<'_> {
@@ -161,12 +189,16 @@ impl Model for ConstantCurvature<'_> {
     }
 
     fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
-        let sound = self.fit(displacements, work);
-        self.place(displacements, work);
+        let status = self.fit(displacements, work);
+        self.place(work);
+        self.measure(displacements, work);
         let paths = self.robot.paths().iter();
-        let residual = (work.misfit.iter().zip(paths))
-            .fold(0.0_f64, |largest, (off, path)| largest.max(off.abs() / path.rest_length));
-        let status = if sound { Status::Converged } else { Status::Infeasible };
+        let residual = if status == Status::NumericalError {
+            f64::INFINITY
+        } else {
+            (work.misfit.iter().zip(paths))
+                .fold(0.0_f64, |largest, (off, path)| largest.max(off.abs() / path.rest_length))
+        };
         Ok(Report { status, residual, iterations: 0 })
     }
 
@@ -179,13 +211,13 @@ impl Model for ConstantCurvature<'_> {
     }
 
     fn message(&self, _: &[f64], work: &Workspace) -> String {
-        if let Some(i) = work.arcs.iter().position(|arc| arc.length <= 0.0) {
-            return format!("the displacements leave segment {i} no length");
+        if let Some(obstacle) = obstacle(&work.arcs) {
+            return format!("the displacements {obstacle}");
         }
         let names = self.robot.tendon_names();
         let off: Vec<String> = (work.misfit.iter().zip(self.robot.paths()).zip(names))
             .filter(|((off, path), _)| off.abs() > CONSISTENT * path.rest_length)
-            .map(|((off, _), name)| format!("'{name}' by {off:+.6} m"))
+            .map(|((off, _), name)| format!("'{name}' by {off:+.3e} m"))
             .collect();
         if off.is_empty() {
             return String::new();

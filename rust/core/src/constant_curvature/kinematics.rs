@@ -3,6 +3,7 @@
 use nalgebra::Matrix6xX;
 
 use super::arc::Arc;
+use super::bent::Bent;
 use crate::lie::Pose;
 
 /// Frames along a chain of arcs: `points` (at least 2) evenly spaced on each, its base and its tip
@@ -28,20 +29,21 @@ pub fn frames(base: &Pose, arcs: &[Arc], points: usize, out: &mut Vec<Pose>) {
 /// arc's bending vector and length, (6, 3m).
 #[must_use]
 pub fn tip_derivative(base: &Pose, tool: &Pose, arcs: &[Arc]) -> Matrix6xX<f64> {
-    let mut starts = Vec::with_capacity(arcs.len());
     let mut frame = *base;
-    for arc in arcs {
-        starts.push(frame);
-        frame = frame.compose(&arc.frame(1.0));
-    }
+    let walk = arcs.iter().map(|arc| {
+        let bent = Bent::new(arc.bend);
+        let axes = frame.rotation;
+        frame = frame.compose(&bent.frame(arc.length));
+        (bent.derivative(arc.length), axes, frame.translation)
+    });
+    let walked: Vec<_> = walk.collect();
     let tip = frame.compose(tool).translation;
     let mut out = Matrix6xX::zeros(3 * arcs.len());
-    for (i, (arc, start)) in arcs.iter().zip(&starts).enumerate() {
-        let local = arc.derivative();
-        let lever = tip - start.compose(&arc.frame(1.0)).translation;
+    for (i, (local, axes, end)) in walked.iter().enumerate() {
+        let lever = tip - end;
         for j in 0..3 {
-            let velocity = start.rotation * local.fixed_view::<3, 1>(0, j);
-            let spin = start.rotation * local.fixed_view::<3, 1>(3, j);
+            let velocity = axes * local.fixed_view::<3, 1>(0, j);
+            let spin = axes * local.fixed_view::<3, 1>(3, j);
             let mut column = out.column_mut(3 * i + j);
             column.fixed_rows_mut::<3>(0).copy_from(&(velocity + spin.cross(&lever)));
             column.fixed_rows_mut::<3>(3).copy_from(&spin);

@@ -5,7 +5,7 @@
 //! bending vector and `e`. Least squares over all tendons; for evenly spaced ones this is the Clarke
 //! transform.
 
-use nalgebra::{DMatrix, DVector, Vector2};
+use nalgebra::{DMatrix, Vector2};
 
 use super::arc::Arc;
 use crate::error::{InvalidInput, finite, positive};
@@ -23,7 +23,8 @@ pub enum Length {
 /// Tendons that end at the tip of one segment, each straight.
 #[derive(Clone, Debug)]
 pub struct Mapping {
-    azimuths: Vec<f64>,
+    /// Cosine and sine of every azimuth.
+    directions: Vec<Vector2<f64>>,
     radii: Vec<f64>,
     rest_length: f64,
     /// Mean radius: the scale that makes bending and elongation comparable.
@@ -71,24 +72,27 @@ impl Mapping {
         }
         positive("length", "m", rest_length)?;
         let scale = radii.iter().sum::<f64>() / radii.len() as f64;
-        Ok(Self { azimuths, radii, rest_length, scale })
+        let directions =
+            azimuths.into_iter().map(|azimuth: f64| Vector2::new(azimuth.cos(), azimuth.sin()));
+        Ok(Self { directions: directions.collect(), radii, rest_length, scale })
     }
 
     /// Number of tendons.
     #[must_use]
     pub fn tendons(&self) -> usize {
-        self.azimuths.len()
+        self.directions.len()
     }
 
     /// Displacements of the tendons on an arc \[m\]: `(ell - rest) - d_j kappa ell cos(psi_j - phi)`.
     #[must_use]
     pub fn displacements(&self, arc: &Arc) -> Vec<f64> {
-        (self.azimuths.iter().zip(&self.radii))
-            .map(|(azimuth, radius)| {
-                let towards = arc.bend.x * azimuth.cos() + arc.bend.y * azimuth.sin();
-                (arc.length - self.rest_length) - radius * towards
-            })
-            .collect()
+        (0..self.tendons()).map(|k| self.displacement(k, arc, self.rest_length)).collect()
+    }
+
+    /// Displacement of one tendon on an arc \[m\], from any rest length \[m\].
+    #[must_use]
+    pub fn displacement(&self, tendon: usize, arc: &Arc, rest_length: f64) -> f64 {
+        (arc.length - rest_length) - self.radii[tendon] * arc.bend.dot(&self.directions[tendon])
     }
 
     /// The arc of the given displacements \[m\]; `inf` frees a tendon, and a single one that is released
@@ -96,8 +100,58 @@ impl Mapping {
     ///
     /// # Errors
     /// `InvalidInput` for another number of displacements than tendons, NaN or -inf, a free length with
-    /// fewer than three tendons that count, or displacements that leave no length.
+    /// fewer than three tendons that count, or displacements that leave no length or overflow.
     pub fn fit(&self, displacements: &[f64], length: Length) -> Result<Fit, InvalidInput> {
+        let (mut pattern, mut residual) = (Pattern::default(), Vec::new());
+        let arc = self.fit_row(displacements, length, &mut pattern, &mut residual)?;
+        let condition = pattern.made.map_or(1.0, |made| made.inverse.condition);
+        Ok(Fit { arc, residual, condition })
+    }
+
+    /// [`Mapping::fit`] for one row of many: keeps the inverse of the last pattern of tendons (of this
+    /// mapping only), and appends the residual.
+    ///
+    /// # Errors
+    /// As [`Mapping::fit`].
+    pub fn fit_row(
+        &self,
+        displacements: &[f64],
+        length: Length,
+        pattern: &mut Pattern,
+        residual: &mut Vec<f64>,
+    ) -> Result<Arc, InvalidInput> {
+        self.count(displacements, &mut pattern.counted)?;
+        let known = match length {
+            Length::Known(length) => Some(positive("ell", "m", length)?),
+            Length::Free if pattern.counted.len() < 3 => {
+                let expected = "a length, or at least three tendons that count";
+                let got = format!("{} tendons", pattern.counted.len());
+                return Err(InvalidInput::new("ell", expected, got));
+            }
+            Length::Free => None,
+        };
+        let elongation = known.map_or(0.0, |length| length - self.rest_length);
+        let unknowns = pattern.solve(self, known.is_none(), |k| displacements[k] - elongation);
+        let bend = Vector2::new(unknowns[0], unknowns[1]) / self.scale;
+        let arc = Arc { bend, length: known.unwrap_or(self.rest_length + unknowns[2]) };
+        if arc.is_finite() && arc.length <= 0.0 {
+            let expected = "displacements that leave the segment a length";
+            return Err(InvalidInput::new("displacements", expected, format!("{} m", arc.length)));
+        }
+        if !(arc.is_finite() && arc.kappa().is_finite()) {
+            let expected = "displacements small enough to compute an arc";
+            return Err(InvalidInput::new("displacements", expected, "an overflow"));
+        }
+        let first = residual.len();
+        residual.resize(first + self.tendons(), 0.0);
+        for &k in &pattern.counted {
+            residual[first + k] = displacements[k] - self.displacement(k, &arc, self.rest_length);
+        }
+        Ok(arc)
+    }
+
+    /// Tendons that count: not free, and not the only, released one.
+    fn count(&self, displacements: &[f64], counted: &mut Vec<usize>) -> Result<(), InvalidInput> {
         if displacements.len() != self.tendons() {
             let expected = format!("{} values, one per tendon", self.tendons());
             return Err(InvalidInput::new("displacements", expected, displacements.len()));
@@ -106,40 +160,14 @@ impl Mapping {
             let expected = "finite numbers [m], or inf for a free tendon";
             return Err(InvalidInput::new("displacements", expected, bad));
         }
-        let mut counted: Vec<usize> =
-            (0..self.tendons()).filter(|k| displacements[*k].is_finite()).collect();
+        counted.clear();
+        counted.extend((0..self.tendons()).filter(|k| displacements[*k].is_finite()));
         if let [only] = counted[..]
             && displacements[only] > 0.0
         {
             counted.clear();
         }
-        let known = match length {
-            Length::Known(length) => Some(positive("ell", "m", length)?),
-            Length::Free if counted.len() < 3 => {
-                let expected = "a length, or at least three tendons that count";
-                let got = format!("{} tendons", counted.len());
-                return Err(InvalidInput::new("ell", expected, got));
-            }
-            Length::Free => None,
-        };
-        let elongation = known.map_or(0.0, |length| length - self.rest_length);
-        let inverse = PseudoInverse::new(&self.matrix(&counted, known.is_none()));
-        let right = counted.iter().map(|k| displacements[*k] - elongation);
-        let right = DVector::from_iterator(counted.len(), right);
-        let unknowns = inverse.solve(&right);
-        let bend = Vector2::new(unknowns[0], unknowns[1]) / self.scale;
-        let length = known.unwrap_or_else(|| self.rest_length + unknowns[2]);
-        if length <= 0.0 || !bend.iter().all(|x| x.is_finite()) {
-            let expected = "displacements that leave the segment a length";
-            return Err(InvalidInput::new("displacements", expected, format!("{length} m")));
-        }
-        let arc = Arc { bend, length };
-        let mut residual = vec![0.0; self.tendons()];
-        let fitted = self.displacements(&arc);
-        for k in counted {
-            residual[k] = displacements[k] - fitted[k];
-        }
-        Ok(Fit { arc, residual, condition: inverse.condition })
+        Ok(())
     }
 
     /// Rows of the counted tendons; unknowns are the bend times the mean radius, and the elongation.
@@ -148,10 +176,53 @@ impl Mapping {
             let k = counted[row];
             let arm = self.radii[k] / self.scale;
             match column {
-                0 => -arm * self.azimuths[k].cos(),
-                1 => -arm * self.azimuths[k].sin(),
+                0 => -arm * self.directions[k].x,
+                1 => -arm * self.directions[k].y,
                 _ => 1.0,
             }
         })
+    }
+}
+
+/// Which tendons of a row count, and the inverse over them, kept for rows with the same ones.
+#[derive(Clone, Debug, Default)]
+pub struct Pattern {
+    counted: Vec<usize>,
+    made: Option<Made>,
+}
+
+#[derive(Clone, Debug)]
+struct Made {
+    counted: Vec<usize>,
+    extensible: bool,
+    inverse: PseudoInverse,
+}
+
+impl Pattern {
+    /// Two bends times the scale, and the elongation when it is extensible.
+    fn solve(
+        &mut self,
+        mapping: &Mapping,
+        extensible: bool,
+        right: impl Fn(usize) -> f64,
+    ) -> [f64; 3] {
+        let same = |made: &Made| made.extensible == extensible && made.counted == self.counted;
+        let made = match self.made.take().filter(same) {
+            Some(made) => made,
+            None => Made {
+                counted: self.counted.clone(),
+                extensible,
+                inverse: PseudoInverse::new(&mapping.matrix(&self.counted, extensible)),
+            },
+        };
+        let mut unknowns = [0.0; 3];
+        for (column, k) in made.inverse.matrix.column_iter().zip(&self.counted) {
+            let value = right(*k);
+            for (unknown, share) in unknowns.iter_mut().zip(column.iter()) {
+                *unknown += share * value;
+            }
+        }
+        self.made = Some(made);
+        unknowns
     }
 }

@@ -10,5 +10,5 @@ mod plan;
 pub use arc::Arc;
 pub use chain::{ConstantCurvature, Workspace};
 pub use kinematics::{frames, tip_derivative};
-pub use mapping::{Fit, Length, Mapping};
+pub use mapping::{Fit, Length, Mapping, Pattern};
 pub use plan::{ConstantCurvatureSettings, Coupling, Plan, displacements};

@@ -1,0 +1,206 @@
+"""What inverses give back: one answer, and many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import numpy as np
+
+from tdcr import _core
+from tdcr._status import Status
+from tdcr.errors import NotConverged
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tdcr._core import (
+        Bounds,
+        ConstantCurvatureSettings,
+        InverseSettings,
+        LinkageSettings,
+        Robot,
+        Shape,
+    )
+
+    Settings: TypeAlias = LinkageSettings | ConstantCurvatureSettings
+    Array: TypeAlias = NDArray[np.float64]
+    Method: TypeAlias = Literal["newton", "pso"]
+
+__all__ = ["Inverse", "InverseBatch"]
+
+
+class _Value:
+    """Equality field by field, arrays by their numbers; arrays read-only, also after unpickling."""
+
+    robot: Robot
+    displacements: Array
+    model: str
+
+    def __eq__(self, other: object) -> bool:
+        """Compare by value: the same robot, target, choices and answer, but for its message."""
+        if type(other) is not type(self):
+            return NotImplemented
+        mine, theirs = self.__getstate__(), other.__getstate__()
+        return all(_same(mine[name], theirs[name]) for name in mine if name != "message")
+
+    def __hash__(self) -> int:
+        """Hash by robot and displacements."""
+        # + 0.0: negative zeros are equal to zeros.
+        return hash((self.robot, self.model, (self.displacements + 0.0).tobytes()))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields, without what was computed from them."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the fields, arrays read-only."""
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+        self.__dict__.update(state)
+
+
+def _same(mine: Any, theirs: Any) -> bool:
+    if isinstance(mine, np.ndarray):
+        return np.array_equal(mine, theirs, equal_nan=mine.dtype.kind == "f")
+    return bool(mine == theirs)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Inverse(_Value):
+    """Displacements that bring the tool to a target, and how it went. Arrays are read-only."""
+
+    robot: Robot
+    target: Array
+    """A position (3,) or a frame (4, 4), world frame [m]."""
+    displacements: Array
+    """Tendon displacements, (K,) [m]: negative pulls."""
+    status: Status
+    """converged: the target is met, with the least bending energy nearby where there is freedom;
+    unreachable: the nearest answer that was found; infeasible: the bounds exclude each other;
+    iteration_limit, numerical_error: stopped before either."""
+    message: str
+    """What stood in the way; empty when it converged."""
+    error: float
+    """Distance from the tool to the target, over the axes that count [m]."""
+    rotation_error: float
+    """Angle from the tool to the target, over the axes that count [rad]; 0 for a position."""
+    iterations: int
+    """Steps taken from all starts."""
+    starts: int
+    """Starts tried."""
+    model: str
+    settings: Settings | None
+    bounds: Bounds | None
+    search: InverseSettings
+    method: Method
+    hits: int = 1
+    """How many starts led to this answer (`inverse_solutions`)."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether it converged."""
+        return self.status is Status.converged
+
+    @cached_property
+    def shape(self) -> Shape:
+        """The robot under the displacements."""
+        return _core.forward(
+            self.robot, self.displacements, model=self.model, settings=self.settings
+        )
+
+    @property
+    def energy(self) -> float:
+        """Strain energy of the robot under the displacements, in the units of `Shape.energy`."""
+        return self.shape.energy
+
+    def require(self) -> Inverse:
+        """Return the result itself, or raise `NotConverged` with its message."""
+        if self.ok:
+            return self
+        raise NotConverged(f"{self.status}: {self.message}", self)
+
+    def __repr__(self) -> str:
+        """Tell the outcome and the displacements."""
+        pulls = np.array2string(
+            self.displacements, precision=6, separator=", ", threshold=12, max_line_width=1000
+        )
+        off = f"{self.error:.3g} m"
+        if self.target.shape == (4, 4):
+            off += f", {self.rotation_error:.3g} rad"
+        return f"<Inverse {self.status}, {off} off, displacements {pulls}>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InverseBatch(_Value, Sequence[Inverse]):
+    """Inverses of one robot, in the order of their targets; `batch[i]` is an `Inverse`."""
+
+    robot: Robot
+    targets: Array
+    """Positions (B, 3) or frames (B, 4, 4), world frame [m]."""
+    displacements: Array
+    """Tendon displacements, (B, K) [m]."""
+    status: NDArray[Any]
+    """`Status` of every row, (B,)."""
+    ok: NDArray[np.bool_]
+    """Whether the row converged, (B,)."""
+    error: Array
+    """Distances to the targets, (B,) [m]."""
+    rotation_error: Array
+    """Angles to the targets, (B,) [rad]."""
+    iterations: NDArray[np.uint64]
+    """Steps taken, (B,)."""
+    starts: NDArray[np.uint64]
+    """Starts tried, (B,). Along a path 1 means that the row went on from the one before; more, that
+    this failed and the answer may be far from it."""
+    model: str
+    settings: Settings | None
+    bounds: Bounds | None
+    search: InverseSettings
+    method: Method
+
+    def __len__(self) -> int:
+        """Return the number of targets B."""
+        return len(self.targets)
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return the inverse of one target, or a list of them for a slice."""
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        i = range(len(self))[index]
+        return Inverse(
+            self.robot,
+            self.targets[i],
+            self.displacements[i],
+            self.status[i],
+            self._message(i),
+            float(self.error[i]),
+            float(self.rotation_error[i]),
+            int(self.iterations[i]),
+            int(self.starts[i]),
+            self.model,
+            self.settings,
+            self.bounds,
+            self.search,
+            self.method,
+        )
+
+    def _message(self, i: int) -> str:
+        """Tell what stood in the way of a row; the core keeps no texts of many rows."""
+        if self.ok[i]:
+            return ""
+        if self.status[i] is Status.infeasible:
+            return f"row {i}: the bounds leave the robot no shape"
+        off = f"{self.error[i]:.3g} m"
+        if self.targets.ndim == 3:
+            off += f" and {self.rotation_error[i]:.3g} rad"
+        tried = int(self.starts[i])
+        return f"row {i} is {off} off the target after {tried} start{'s' if tried != 1 else ''}"
+
+    def __repr__(self) -> str:
+        """Tell size and outcome."""
+        converged = int(np.count_nonzero(self.ok))
+        return f"<InverseBatch of {len(self)} targets, {converged} converged, model {self.model!r}>"
