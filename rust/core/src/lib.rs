@@ -5,8 +5,8 @@
 //!
 //! Rooms, from the bottom up: [`lie`] (rotations and rigid motions), [`solve`] (solvers that know no
 //! robots), [`robot`] (what a robot is), [`model`] (what every forward model offers), [`linkage`]
-//! (the linkage model), [`constant_curvature`], [`planar`] (planar trunks), [`batch`] (many solves on
-//! all cores), [`inverse`] (from targets to displacements).
+//! (the linkage model), [`constant_curvature`], [`rod`] (the strain-energy rod), [`planar`] (planar
+//! trunks), [`batch`] (many solves on all cores), [`inverse`] (from targets to displacements).
 //!
 //! ```
 //! use tdcr::linkage::{Linkage, LinkageSettings, Plan};
