@@ -328,7 +328,8 @@ fn given_points_are_where_the_first_particles_start() {
 fn the_smallest_swarms_run() {
     for (name, kind) in kinds() {
         for (particles, n) in [(1, 1), (1, 3), (2, 1), (2, 2), (5, 1)] {
-            let settings = PsoSettings { particles, ..kind };
+            let neighbours = kind.neighbours.min(particles);
+            let settings = PsoSettings { particles, neighbours, ..kind };
             let report = swarm(settings, 5.0, n).run(&mut Pointwise(sphere)).unwrap();
             assert!(report.value.is_finite(), "{name}");
         }
@@ -372,17 +373,23 @@ fn bad_input_names_the_argument() {
     assert_eq!(of(&[0.0, 0.0], &[1.0]), "upper");
     let error = Swarm::new(base, &[0.0, 3.0], &[1.0, 2.0]).unwrap_err();
     assert_eq!(error.to_string(), "upper: expected at least lower, 3.0 in coordinate 1, got 2.0");
+    // Links are bounded by the swarm's size and by their number, but for a global swarm.
+    for topology in [Topology::Ring, Topology::Random] {
+        let linked =
+            |particles, neighbours| PsoSettings { particles, neighbours, topology, ..base };
+        assert!(linked(3000, 3000).validate().is_ok());
+        assert!(linked(1, 1).validate().is_ok());
+        assert!(linked(1_000_000, 10).validate().is_ok());
+        for (particles, neighbours) in [(3000, 3001), (3000, 1_000_000), (1_000_000, 11)] {
+            let error = linked(particles, neighbours).validate().unwrap_err();
+            assert_eq!(error.argument, "neighbours", "{error}");
+        }
+    }
+    assert!(PsoSettings { neighbours: 1_000_000, ..base }.validate().is_ok());
     // More than any memory holds.
     let huge = PsoSettings { particles: 1_000_000, ..base };
     let (lower, upper) = (vec![0.0; 4_000_000], vec![1.0; 4_000_000]);
     assert_eq!(Swarm::new(huge, &lower, &upper).unwrap_err().argument, "particles");
-    let informed = PsoSettings {
-        particles: 1_000_000,
-        neighbours: 1_000_000,
-        topology: Topology::Random,
-        ..base
-    };
-    assert_eq!(Swarm::new(informed, &[0.0], &[1.0]).unwrap_err().argument, "particles");
     // A refused reset leaves the swarm as it was.
     let mut swarm = swarm(base, 5.0, 2);
     let before = swarm.run(&mut Pointwise(sphere)).unwrap();

@@ -30,6 +30,7 @@ use crate::convert::invalid;
 ///     or of those that happen to inform it (each informs `neighbours` others, drawn anew after an
 ///     iteration without progress).
 /// neighbours : int, optional
+///     At most `particles`, and 1e7/`particles`; topology "global" has no use for it.
 /// particles : int, optional
 ///     Size of the swarm.
 /// bounds : {"clamp", "reflect", "absorb", "rebound"}, optional

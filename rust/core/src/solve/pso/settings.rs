@@ -72,8 +72,8 @@ pub struct PsoSettings {
     pub social: f64,
     /// Whose best point it knows.
     pub topology: Topology,
-    /// Particles known on either side of a ring, or informed at random; a global swarm has no use
-    /// for it.
+    /// Particles known on either side of a ring, or informed at random, at most as many as there are
+    /// and 1e7 in the whole swarm; a global swarm has no use for it.
     pub neighbours: usize,
     /// Size of the swarm.
     pub particles: usize,
@@ -101,6 +101,9 @@ const MOST_ITERATIONS: usize = 1_000_000;
 
 /// Size of a swarm that can be asked for.
 const MOST_PARTICLES: usize = 1_000_000;
+
+/// Links that a swarm may have: all are gone through between two moves, where nothing can stop it.
+const MOST_LINKS: usize = 10_000_000;
 
 /// Clerc & Kennedy's phi = c1 + c2 with c1 = c2 = 2.05.
 pub const PHI: f64 = 4.1;
@@ -190,6 +193,7 @@ impl PsoSettings {
         within("social", self.social, 0.0, 10.0)?;
         count("neighbours", self.neighbours, MOST_PARTICLES)?;
         count("particles", self.particles, MOST_PARTICLES)?;
+        self.check_links()?;
         count("max_iterations", self.max_iterations, MOST_ITERATIONS)?;
         count("stagnation", self.stagnation.unwrap_or(1), usize::MAX)?;
         within("improvement", self.improvement, 0.0, f64::MAX)?;
@@ -208,6 +212,17 @@ impl PsoSettings {
             return Err(InvalidInput::new("max_evaluations", expected, got));
         }
         Ok(())
+    }
+
+    /// Refuses more neighbours than there are particles, and more links than can be gone through.
+    fn check_links(&self) -> Result<(), InvalidInput> {
+        let most = self.particles.min(MOST_LINKS / self.particles);
+        if self.topology == Topology::Global || self.neighbours <= most {
+            return Ok(());
+        }
+        let (topology, particles) = (self.topology.as_str(), self.particles);
+        let expected = format!("1 to {most} with topology \"{topology}\" of {particles} particles");
+        Err(InvalidInput::new("neighbours", expected, self.neighbours))
     }
 }
 
