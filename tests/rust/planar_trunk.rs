@@ -72,6 +72,28 @@ fn cables_and_turns_undo_each_other() {
 }
 
 /// The heading's integral, platforms at the ends of sections.
+/// Half a circle comes back although the cable lengths are rounded.
+#[test]
+fn half_circles_are_chords() {
+    let mut uniform = uniform(11);
+    for _ in 0..2000 {
+        let length = 10.0_f64.powf(uniform(-2.0, 3.0));
+        let trunk = Trunk::new(vec![length], length * 10.0_f64.powf(uniform(-6.0, -0.5))).unwrap();
+        for turn in [-PI, PI] {
+            let cables = trunk.cable_lengths(&[turn], Cables::Chords).unwrap();
+            let back = trunk.turns(&cables, Cables::Chords).unwrap().turns[0];
+            // The sine is flat there: the turn is known to the root of its rounding.
+            let share = cables[0][0].max(cables[0][1]) / (cables[0][1] - cables[0][0]).abs();
+            let known = 8.0 * (f64::EPSILON * (1.0 + share)).sqrt();
+            assert!((back - turn).abs() <= known, "{back} for {turn}");
+        }
+    }
+    let trunk = Trunk::new(vec![0.21], 0.0342).unwrap();
+    let apart = |share: f64| trunk.turns(&[[0.1, 0.1 + 0.0342 * share]], Cables::Chords);
+    assert!(apart(2.0 + 1e-13).is_ok());
+    assert_eq!(apart(2.0 + 1e-11).unwrap_err().argument, "cable_lengths[0]");
+}
+
 #[test]
 fn curves_end_on_the_platforms() {
     let trunk = Trunk::new(vec![0.2, 0.15, 0.1], 0.06).unwrap();
@@ -208,6 +230,16 @@ fn bad_trunks_name_the_argument() {
     assert_eq!(name(&[0.0, 0.0], &[0.0, 0.0]), "s[1]");
     assert_eq!(name(&[0.0, 1.0], &[0.0]), "angles");
     assert_eq!(name(&[0.0, 1.0], &[0.0, f64::NAN]), "angles[1]");
+    // Splines that overflow, or whose error would.
+    assert_eq!(name(&[-1.7e308, 1.7e308], &[0.0, 1.0]), "s");
+    assert_eq!(name(&[0.0, 4e307, 8e307], &[0.0, 1.0, 0.0]), "s");
+    assert_eq!(name(&[0.0, 1e-300, 1.0], &[0.0, 1.0, 2.0]), "s");
+    assert_eq!(name(&[0.0, 1.0, 2.0], &[-1e308, 1e308, 0.0]), "s");
+    for (s, angles) in [([0.0, 1e100], [0.0, 0.0]), ([0.0, 1e-300], [0.0, 3.0])] {
+        let curve = AngleFunction::new(s.to_vec(), &angles).unwrap().curve(10).unwrap();
+        assert!(curve.error.is_finite() && curve.error <= 0.01 * s[1], "{}", curve.error);
+        assert!(curve.points.iter().all(|point| point.iter().all(|x| x.is_finite())));
+    }
     let angle = AngleFunction::new(vec![0.0, 1.0], &[0.0, 1.0]).unwrap();
     assert_eq!(angle.curve(1).unwrap_err().argument, "intervals");
 }

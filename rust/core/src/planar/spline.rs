@@ -31,7 +31,7 @@ impl AngleFunction {
     ///
     /// # Errors
     /// `InvalidInput` for fewer than two nodes, arc lengths that do not rise, other numbers of angles
-    /// than nodes, or values that are not finite.
+    /// than nodes, values that are not finite, or a spline that overflows.
     pub fn new(s: Vec<f64>, angles: &[f64]) -> Result<Self, InvalidInput> {
         if s.len() < 2 {
             return Err(InvalidInput::new("s", "at least 2 nodes", s.len()));
@@ -48,14 +48,30 @@ impl AngleFunction {
                 return Err(InvalidInput::new(format!("s[{i}]"), "arc lengths that rise [m]", got));
             }
         }
+        let span = s[s.len() - 1] - s[0];
+        // Four times: sums of the elimination.
+        if !(4.0 * span).is_finite() {
+            let got = format!("{:?} to {:?}", s[0], s[s.len() - 1]);
+            return Err(InvalidInput::new("s", "a span that does not overflow [m]", got));
+        }
         let curvature = second_derivatives(&s, angles);
         let piece = |i: usize| {
             let h = s[i + 1] - s[i];
             let (m, n) = (curvature[i] * h * h / 6.0, curvature[i + 1] * h * h / 6.0);
             [n - m, 3.0 * m, angles[i + 1] - angles[i] - 2.0 * m - n, angles[i]]
         };
-        let pieces = (0..s.len() - 1).map(piece).collect();
-        Ok(Self { nodes: s, pieces })
+        let pieces: Vec<_> = (0..s.len() - 1).map(piece).collect();
+        let function = Self { nodes: s, pieces };
+        // The bound of Simpson's error for one interval per piece: less for any other number.
+        let bound = |i: usize| (function.nodes[i + 1] - function.nodes[i]) * function.fourth(i);
+        let whole: f64 = (0..function.pieces.len()).map(bound).sum();
+        if whole.is_finite() && function.pieces.iter().flatten().all(|c| c.is_finite()) {
+            return Ok(function);
+        }
+        let expected = "nodes at distances that keep the spline from overflowing";
+        let nearest = function.nodes.windows(2).map(|ends| ends[1] - ends[0]).reduce(f64::min);
+        let got = format!("{:?} m at least", nearest.unwrap_or(span));
+        Err(InvalidInput::new("s", expected, got))
     }
 
     /// The nodes \[m\].
@@ -124,22 +140,22 @@ impl AngleFunction {
                 curve.points.push(at);
                 curve.headings.push(heading);
             }
-            curve.error += h.powi(4) * length / 180.0 * self.fourth(i);
+            let share = 0.5 / pairs as f64;
+            curve.error += share.powi(4) / 180.0 * (length * self.fourth(i));
         }
         Ok(curve)
     }
 
-    /// Bound of the fourth derivative of `exp(i alpha)` by s on a piece:
+    /// Bound of the fourth derivative of `exp(i alpha)` by u = (s - s_i)/h on a piece:
     /// `|-3 a2^2 - 4 a1 a3 + i 6 a1^2 a2 + a1^4|` with the derivatives a1, a2, a3 of alpha.
     fn fourth(&self, i: usize) -> f64 {
-        let h = self.nodes[i + 1] - self.nodes[i];
         let [a, b, c, _] = self.pieces[i];
-        let slope = |u: f64| ((3.0 * a * u + 2.0 * b) * u + c).abs() / h;
+        let slope = |u: f64| ((3.0 * a * u + 2.0 * b) * u + c).abs();
         // The slope is largest at an end or where it turns.
         let turning = if a == 0.0 { 0.0 } else { (-b / (3.0 * a)).clamp(0.0, 1.0) };
         let a1 = slope(0.0).max(slope(1.0)).max(slope(turning));
-        let a2 = (2.0 * b).abs().max((6.0 * a + 2.0 * b).abs()) / (h * h);
-        let a3 = (6.0 * a).abs() / (h * h * h);
+        let a2 = (2.0 * b).abs().max((6.0 * a + 2.0 * b).abs());
+        let a3 = (6.0 * a).abs();
         let real = 3.0 * a2 * a2 + 4.0 * a1 * a3 + a1.powi(4);
         real.hypot(6.0 * a1 * a1 * a2)
     }

@@ -100,10 +100,12 @@ impl Trunk {
                 positive(&format!("cable_lengths[{i}][{k}]"), "m", cable)?;
             }
             let share = (l2 - l1) / self.cable_distance;
+            let rounding = (2.0 * f64::EPSILON * (l1 + l2) / self.cable_distance).max(1e-12);
             let turn = match reading {
                 Cables::Arcs => share,
-                Cables::Chords if share.abs() <= 2.0 => {
-                    let sin = 0.5 * share;
+                // Half a circle, whose lengths have been rounded, is one.
+                Cables::Chords if share.abs() <= 2.0 + rounding => {
+                    let sin = (0.5 * share).clamp(-1.0, 1.0);
                     2.0 * sin.atan2((1.0 - sin * sin).sqrt())
                 }
                 Cables::Chords => {
