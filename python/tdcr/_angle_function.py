@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from tdcr import _core
+from tdcr._value import Value, rebuilt
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -28,8 +30,13 @@ class Curve(NamedTuple):
     error: float
     """Bound of the distance of any point from the exact curve, rounding apart [m]; 0 for arcs."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy with arrays that stay read-only."""
+        return rebuilt, (type(self), *self)
 
-class AngleFunction:
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class AngleFunction(Value):
     """A natural cubic spline through nodal angles, and the curve it makes (eqs. 10 and 11).
 
     Parameters
@@ -48,25 +55,25 @@ class AngleFunction:
     Raises
     ------
     InvalidInput
-        Fewer than two nodes, arc lengths that do not rise, another number of angles, NaN.
+        Fewer than two nodes, arc lengths that do not rise, another number of angles, NaN, a spline
+        that overflows.
     """
 
-    __slots__ = ("angles", "coefficients", "s")
+    _hashed: ClassVar[tuple[str, ...]] = ("s", "angles")
 
     s: Array
     angles: Array
     coefficients: Array
 
     def __init__(self, s: ArrayLike, angles: ArrayLike) -> None:
-        self.coefficients = _core._angle_coefficients(s, angles)
-        self.s = frozen(s)
-        self.angles = frozen(angles)
+        object.__setattr__(self, "coefficients", _core._angle_coefficients(s, angles))
+        object.__setattr__(self, "s", frozen(s))
+        object.__setattr__(self, "angles", frozen(angles))
 
     def __call__(self, s: ArrayLike) -> Any:
         """Angle at arc lengths s [rad]: a float for a float, else an array of the same shape."""
-        at = np.asarray(s, dtype=np.float64)
-        values = _core._angle_at(self.s, self.angles, at.reshape(-1)).reshape(at.shape)
-        return values if at.ndim else float(values)
+        values = _core._angle_at(self.s, self.angles, s)
+        return values if values.ndim else float(values)
 
     def curve(self, intervals: int = 1000) -> Curve:
         """Integrate the tangent by Simpson's rule, from the origin.

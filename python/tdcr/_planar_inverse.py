@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from tdcr import _core
 from tdcr._core import PsoSettings
 from tdcr._progress import told
 from tdcr._status import Status
+from tdcr._value import Value
 from tdcr.errors import InvalidInput, NotConverged
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ __all__ = ["PlanarInverse", "PlanarInverseBatch", "Swarm", "many", "one"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PlanarInverse:
+class PlanarInverse(Value):
     """Turns that put the tip of a planar trunk on a target, or as near as can be.
 
     Attributes
@@ -60,6 +61,8 @@ class PlanarInverse:
     moves, evaluations, swarms : int
         Of all swarms, restarts included.
     """
+
+    _hashed: ClassVar[tuple[str, ...]] = ("trunk", "turns", "method")
 
     trunk: PlanarTrunk
     turns: Array
@@ -121,7 +124,7 @@ class PlanarInverse:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PlanarInverseBatch(Sequence[PlanarInverse]):
+class PlanarInverseBatch(Value, Sequence[PlanarInverse]):
     """Inverses of one planar trunk, in the order of their targets; `batch[i]` is one of them.
 
     Attributes
@@ -139,6 +142,8 @@ class PlanarInverseBatch(Sequence[PlanarInverse]):
     settings : PsoSettings or None
     objective : str or None
     """
+
+    _hashed: ClassVar[tuple[str, ...]] = ("trunk", "points", "method")
 
     trunk: PlanarTrunk
     points: Array

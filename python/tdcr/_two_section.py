@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sized
 from math import tau
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from tdcr import _core
 from tdcr._progress import told
+from tdcr._value import rebuilt
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -33,6 +34,10 @@ class Nearest(NamedTuple):
     distance: float
     """From the tip to the target [m]."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy with arrays that stay read-only."""
+        return rebuilt, (type(self), *self)
+
 
 class TwoSectionBatch(NamedTuple):
     """Every solution of many targets, in one flat table."""
@@ -43,6 +48,10 @@ class TwoSectionBatch(NamedTuple):
     """Number of the target that a solution belongs to, (T,)."""
     counts: NDArray[np.uint64]
     """Number of solutions of every target, (B,)."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy with arrays that stay read-only."""
+        return rebuilt, (type(self), *self)
 
 
 def two_section_solutions(l1: float, l2: float, x: float, y: float, limit: float = tau) -> Array:

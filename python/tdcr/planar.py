@@ -25,7 +25,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import tau
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from tdcr._two_section import (
     two_section_nearest,
     two_section_solutions,
 )
+from tdcr._value import Value
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PlanarShape:
+class PlanarShape(Value):
     """A bent planar trunk.
 
     Attributes
@@ -79,6 +80,8 @@ class PlanarShape:
     misfit : ndarray, shape (m,) or None
         Mean cable length given minus the mean that fits the section [m]; None without cables.
     """
+
+    _hashed: ClassVar[tuple[str, ...]] = ("trunk", "turns")
 
     trunk: PlanarTrunk
     turns: Array
@@ -175,7 +178,7 @@ class PlanarTrunk:
     cable_distance: float
 
     def __init__(self, lengths: ArrayLike, cable_distance: float) -> None:
-        checked, distance = _core._planar_trunk(np.atleast_1d(np.asarray(lengths)), cable_distance)
+        checked, distance = _core._planar_trunk(lengths, cable_distance)
         object.__setattr__(self, "lengths", tuple(checked))
         object.__setattr__(self, "cable_distance", distance)
 
@@ -222,11 +225,11 @@ class PlanarTrunk:
         InvalidInput
             Another number of turns than sections, NaN.
         """
-        return self._shape(np.atleast_1d(np.asarray(turns)), None)
+        return self._shape(turns, None)
 
-    def _shape(self, turns: Array, misfit: Array | None) -> PlanarShape:
+    def _shape(self, turns: ArrayLike, misfit: Array | None) -> PlanarShape:
         positions, headings = _core._planar_platforms(*self._given, turns)
-        return PlanarShape(self, frozen(turns), positions, headings, misfit)
+        return PlanarShape(self, frozen(np.atleast_1d(turns)), positions, headings, misfit)
 
     def cable_lengths(
         self, turns: ArrayLike, *, cables: Literal["chords", "arcs"] = "chords"
@@ -239,8 +242,7 @@ class PlanarTrunk:
             Turns that do not fit, chords turned by more than pi, a turn that leaves a cable no
             length, an unknown reading.
         """
-        given = np.atleast_1d(np.asarray(turns))
-        answer: Array = _core._planar_cable_lengths(*self._given, given, cables)
+        answer: Array = _core._planar_cable_lengths(*self._given, turns, cables)
         return answer
 
     def inverse(

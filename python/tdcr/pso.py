@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from tdcr import _core
 from tdcr._core import PsoSettings
 from tdcr._progress import told
 from tdcr._status import Status
+from tdcr._value import Value
 from tdcr.errors import NotConverged
 
 if TYPE_CHECKING:
@@ -36,8 +37,10 @@ __all__ = ["PsoResult", "PsoSettings", "minimize"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PsoResult:
+class PsoResult(Value):
     """The best point of a run, and how it ended. A value: compared, hashed and pickled as such."""
+
+    _hashed: ClassVar[tuple[str, ...]] = ("x", "settings")
 
     x: Array
     """The best point, (n,)."""
@@ -73,36 +76,11 @@ class PsoResult:
             return self
         raise NotConverged(f"{self.status}: {self.message}", self)
 
-    def __eq__(self, other: object) -> bool:
-        """Compare by value."""
-        if not isinstance(other, PsoResult):
-            return NotImplemented
-        return (
-            self._scalars() == other._scalars()
-            and np.array_equal(self.x, other.x)
-            and np.array_equal(self.history, other.history)
-        )
-
-    def __hash__(self) -> int:
-        """Hash by point and settings."""
-        return hash((self.x.tobytes(), self.settings))
-
     def __repr__(self) -> str:
         """Tell point, value and outcome."""
         return (
             f"<PsoResult x={self.x}, value={self.value:.6g}, {self.status} by {self.stop} after "
             f"{self.iterations} iterations, {self.evaluations} evaluations>"
-        )
-
-    def _scalars(self) -> tuple[object, ...]:
-        return (
-            self.value,
-            self.status,
-            self.stop,
-            self.iterations,
-            self.evaluations,
-            self.nan_count,
-            self.settings,
         )
 
 

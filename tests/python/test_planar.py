@@ -1,5 +1,6 @@
 """Planar trunks from Python: cables, shapes, angle functions, inverses, errors."""
 
+import copy
 import doctest
 import inspect
 import pickle
@@ -8,6 +9,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -67,6 +69,18 @@ def test_cables_back_and_forth():
         assert np.abs(shape.misfit).max() < 1e-14
     # A left turn shortens the left cable.
     assert lengths[0, 0] < lengths[0, 1]
+
+
+def test_half_circles_are_chords():
+    rng = np.random.default_rng(5)
+    for _ in range(300):
+        length = rng.uniform(0.05, 1.0)
+        trunk = planar.PlanarTrunk([length], length * rng.uniform(0.01, 0.3))
+        for turn in (np.pi, -np.pi):
+            back = trunk.forward(trunk.cable_lengths([turn])).turns[0]
+            assert back == pytest.approx(turn, abs=2e-6)
+    trunk = planar.PlanarTrunk([0.21], 0.0342)
+    assert trunk.forward(trunk.cable_lengths([np.pi])).turns[0] == pytest.approx(np.pi, abs=1e-7)
 
 
 def test_curves_and_angles():
@@ -226,6 +240,62 @@ def test_objects_are_values():
     assert "converged" in repr(THREE.inverse(0.3, 0.1))
 
 
+def results():
+    shape = THREE.forward(CABLES)
+    angle = planar.AngleFunction([0.0, 0.1, 0.3], [0.0, 0.2, -0.1])
+    return [
+        shape,
+        THREE.shape([1.0, 0.5, 0.0]),
+        angle,
+        THREE.inverse(0.3, 0.1),
+        THREE.inverse(0.3, 0.1, method="pso"),
+        THREE.inverse_batch([(0.3, 0.1), (0.2, 0.2)]),
+        THREE.inverse_batch([(0.3, 0.1), (0.2, 0.2)], method="pso"),
+    ]
+
+
+def test_results_are_values():
+    made = results()
+    for i, (first, again) in enumerate(zip(made, results(), strict=True)):
+        for twin in (again, pickle.loads(pickle.dumps(first)), copy.deepcopy(first)):
+            assert twin is not first
+            assert twin == first
+            assert hash(twin) == hash(first)
+            arrays = [getattr(twin, field.name) for field in fields(twin)]
+            for array in arrays:
+                assert not isinstance(array, np.ndarray) or not array.flags.writeable
+        assert first != "a result"
+        assert [first == other for other in made] == [i == j for j in range(len(made))]
+    shape, _, angle, answer = made[:4]
+    for old, name in ((shape, "turns"), (angle, "angles"), (answer, "error")):
+        with pytest.raises(AttributeError):
+            setattr(old, name, 0.0)
+    # NaN equals NaN, -0 equals 0.
+    for nan in (np.nan, -np.nan):
+        ones = replace(shape, misfit=np.array([0.0, nan, 1.0]), turns=np.array([0.0, nan, 1.0]))
+        twos = replace(
+            shape, misfit=np.array([-0.0, np.nan, 1.0]), turns=np.array([-0.0, np.nan, 1])
+        )
+        assert ones == twos
+        assert hash(ones) == hash(twos)
+    assert replace(answer, error=float("nan")) == replace(answer, error=float("nan"))
+    assert replace(shape, misfit=None) != shape
+
+
+def test_named_tuples_stay_read_only():
+    made = [
+        THREE.shape([1.0, 0.5, 0.0]).curve(5),
+        planar.two_section_batch(L1, L2, [(0.2, 0.03)]),
+        planar.two_section_nearest(L1, L2, 0.2, 0.03),
+    ]
+    for first in made:
+        for twin in (pickle.loads(pickle.dumps(first)), copy.deepcopy(first)):
+            assert type(twin) is type(first)
+            for old, new in zip(first, twin, strict=True):
+                assert np.array_equal(old, new)
+                assert not isinstance(new, np.ndarray) or not new.flags.writeable
+
+
 def test_defaults_are_those_of_the_core():
     parameters = inspect.signature(planar.PlanarTrunk.inverse).parameters
     batch = inspect.signature(planar.PlanarTrunk.inverse_batch).parameters
@@ -254,6 +324,12 @@ def test_defaults_are_those_of_the_core():
         ("s[1]", lambda: planar.AngleFunction([0.1, 0.0], [0.0, 0.0])),
         ("angles", lambda: planar.AngleFunction([0.0, 0.1], [0.0])),
         ("angles[0]", lambda: planar.AngleFunction([0.0, 0.1], [np.inf, 0.0])),
+        ("s", lambda: planar.AngleFunction([0, 1e-300, 1], [0, 1, 2])),
+        ("s", lambda: planar.AngleFunction([-1.7e308, 1.7e308], [0, 1])),
+        ("s", lambda: planar.AngleFunction([0.0, 0.1], [0.0, 1.0])([[0.1], 0.0])),
+        ("turns", lambda: THREE.shape([[], 0, 0])),
+        ("turns", lambda: THREE.cable_lengths([[], 0, 0])),
+        ("lengths", lambda: planar.PlanarTrunk([[], 0.1], 0.06)),
         ("intervals", lambda: planar.AngleFunction([0.0, 0.1], [0.0, 1.0]).curve(0)),
         ("x", lambda: THREE.inverse(np.nan, 0.0)),
         ("y", lambda: THREE.inverse(0.0, np.inf)),
@@ -285,6 +361,9 @@ def test_bad_input_names_the_argument(argument, call):
     [
         lambda: planar.PlanarTrunk(["a"], 0.06),
         lambda: planar.PlanarTrunk([0.1], "0.06"),
+        lambda: planar.AngleFunction([0.0, 0.1], [0.0, 1.0])("a"),
+        lambda: THREE.shape(["a", "b", "c"]),
+        lambda: THREE.cable_lengths("abc"),
         lambda: THREE.inverse("0", 0.0),
         lambda: THREE.inverse(0.1, 0.0, starts=1.5),
         lambda: planar.two_section_solutions(0.1, 0.1, None, 0.0),

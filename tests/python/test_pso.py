@@ -1,5 +1,6 @@
 """tdcr.pso: Python functions, settings as values, exceptions, callbacks, Ctrl-C."""
 
+import copy
 import doctest
 import inspect
 import math
@@ -89,7 +90,11 @@ def test_results_are_read_only_values():
             array[...] = 0
     with pytest.raises(AttributeError):
         found.value = 0
-    assert pickle.loads(pickle.dumps(found)) == found
+    for twin in (pickle.loads(pickle.dumps(found)), copy.deepcopy(found)):
+        assert twin == found
+        assert hash(twin) == hash(found)
+        assert not twin.x.flags.writeable
+        assert not twin.history.flags.writeable
     assert found != "found"
     assert repr(found).startswith("<PsoResult x=[")
     assert (found.status, found.stop) == ("iteration_limit", "iterations")
@@ -138,6 +143,8 @@ def test_presets_are_those_published():
         ("social", {"social": 11.0}),
         ("topology", {"topology": "gbest"}),
         ("neighbours", {"neighbours": 0}),
+        ("neighbours", {"neighbours": 10**6, "particles": 3000, "topology": "random"}),
+        ("neighbours", {"neighbours": 31, "particles": 30, "topology": "ring"}),
         ("particles", {"particles": 0}),
         ("particles", {"particles": -3}),
         ("particles", {"particles": 2**70}),

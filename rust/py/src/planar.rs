@@ -175,7 +175,7 @@ pub(crate) fn _angle_coefficients(
     frozen(py, flat(pieces.iter().copied()), &[pieces.len(), 4])
 }
 
-/// Angles (k,) of the spline at (k,) arc lengths.
+/// Angles of the spline at arc lengths, in their shape.
 #[pyfunction]
 pub(crate) fn _angle_at(
     py: Python<'_>,
@@ -184,9 +184,9 @@ pub(crate) fn _angle_at(
     at: &Bound<'_, PyAny>,
 ) -> PyResult<Py<PyAny>> {
     let angle = angle(s, angles)?;
-    let at = row("at", at)?;
-    let count = at.len();
-    frozen(py, at.into_iter().map(|s| angle.at(s)).collect(), &[count])
+    let at = float_array("s", at)?;
+    let angles = values(&at)?.iter().map(|s| angle.at(*s)).collect();
+    frozen(py, angles, at.shape())
 }
 
 type Sampled = (Py<PyAny>, Py<PyAny>, Py<PyAny>, f64);
