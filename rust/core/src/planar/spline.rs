@@ -146,7 +146,7 @@ impl AngleFunction {
         Ok(curve)
     }
 
-    /// Bound of the fourth derivative of `exp(i alpha)` by u = (s - s_i)/h on a piece:
+    /// Bound of the fourth derivative of `exp(i alpha)` by `u = (s - s_i)/h` on a piece:
     /// `|-3 a2^2 - 4 a1 a3 + i 6 a1^2 a2 + a1^4|` with the derivatives a1, a2, a3 of alpha.
     fn fourth(&self, i: usize) -> f64 {
         let [a, b, c, _] = self.pieces[i];
