@@ -222,7 +222,7 @@ impl<'s, 'a> Hunt<'s, 'a> {
         let most = solver.settings.max_iterations;
         solver.work.held.clear();
         let (settled, steps) =
-            descend(&solver.problem, &mut turns, tolerance, most, &mut solver.work);
+            descend(&solver.problem, &mut turns, tolerance, most, solver.stop, &mut solver.work);
         solver.iterations += steps;
         if !settled || depth(solver, &turns, self.circles) > 0.0 {
             turns = clear;
