@@ -1,13 +1,19 @@
 //! The inverse of least bending energy: any number of sections, headings, limits, out of reach.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tdcr::Status;
-use tdcr::planar::{Goal, Inverse, InverseSettings, Trunk, TwoSections, inverse, polish};
+use tdcr::batch::{Control, pool};
+use tdcr::planar::{
+    Goal, Inverse, InverseSettings, Trunk, TwoSections, inverse, inverse_rows, inverse_until,
+    polish,
+};
 
 fn uniform(seed: u64) -> impl FnMut(f64, f64) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -211,4 +217,78 @@ fn bad_goals_name_the_argument() {
     assert_eq!(name(&fine, &InverseSettings { starts: 0, ..settings }), "starts");
     let error = polish(&trunk, &fine, &[0.0], &settings).unwrap_err();
     assert_eq!(error.argument, "turns");
+}
+
+/// All turns on limits of their own: the target is reached, and that is the answer.
+#[test]
+fn corners_of_the_limits_converge() {
+    let mut u = uniform(66);
+    for case in 0..201 {
+        let m = if case == 0 { 3 } else { 3 + case % 4 };
+        let mut lengths: Vec<f64> = (0..m).map(|_| u(0.05, 0.2)).collect();
+        let mut limits: Vec<f64> = (0..m).map(|_| u(0.3, 3.0)).collect();
+        let mut made: Vec<f64> = limits.iter().map(|l| l.copysign(u(-1.0, 1.0))).collect();
+        if case == 0 {
+            (lengths, limits) = (vec![0.1, 0.12, 0.08], vec![0.52, 2.72, 1.46]);
+            made = vec![-0.52, -2.72, -1.46];
+        }
+        let trunk = trunk(&lengths);
+        let aim = tip(&trunk, &made).0;
+        let asked = Goal { point: aim, heading: None, limits: limits.clone() };
+        let got = solve(&trunk, &asked);
+        assert_eq!(got.status, Status::Converged, "{case} {made:?} {got:?}");
+        assert!(got.error <= 1e-12 && got.energy <= energy(&trunk, &made) * (1.0 + 1e-9));
+        assert!(got.turns.iter().zip(&limits).all(|(turn, limit)| turn.abs() <= *limit));
+    }
+}
+
+/// A search of a minute ends soon after it is told to, alone and in a batch.
+#[test]
+fn one_long_search_can_be_stopped() {
+    let trunk = trunk(&[0.02; 50]);
+    let asked = goal(Vector2::new(0.5, 0.3), None, TAU);
+    let settings = InverseSettings { starts: 10_000, ..InverseSettings::default() };
+    let (control, pool) = (Control::default(), pool(Some(1)).unwrap());
+    let begin = Instant::now();
+    std::thread::scope(|scope| {
+        let alone = scope.spawn(|| inverse_until(&trunk, &asked, &settings, &control.stop));
+        let goals = [asked.clone()];
+        let (all, control, trunk, settings) = (&pool, &control, &trunk, &settings);
+        let rows = scope.spawn(move || inverse_rows(trunk, &goals, settings, all, control));
+        std::thread::sleep(Duration::from_millis(200));
+        control.stop.store(true, Ordering::Relaxed);
+        assert_eq!(alone.join().unwrap(), Ok(None));
+        assert_eq!(rows.join().unwrap(), Ok(None));
+    });
+    assert!(begin.elapsed() < Duration::from_secs(3), "{:?}", begin.elapsed());
+    let few = InverseSettings { starts: 1, ..settings };
+    let short = self::trunk(&[0.3, 0.3, 0.4]);
+    let free = AtomicBool::new(false);
+    let same = inverse_until(&short, &asked, &few, &free).unwrap();
+    assert_eq!(same, Some(inverse(&short, &asked, &few).unwrap()));
+}
+
+/// Targets whose distances all tie in rounding still have a nearest point: the farthest their way.
+#[test]
+fn nearest_points_to_far_targets() {
+    let two = TwoSections::new(0.1, 0.1, TAU).unwrap();
+    for far in [1e3, 1e10, 1e150, 1e300] {
+        let (turns, distance) = two.nearest(far, 0.05);
+        assert!(turns.iter().all(|turn| turn.abs() < 2e-3), "{far} {turns:?}");
+        assert!((distance / (far - 0.2) - 1.0).abs() < 1e-8, "{far} {distance}");
+    }
+    let mut u = uniform(67);
+    for case in 0..50 {
+        let angle = u(-PI, PI);
+        let way = Vector2::new(angle.cos(), angle.sin());
+        let ahead = |turns| two.tip(turns).dot(&way);
+        let got = two.nearest(1e100 * way.x, 1e100 * way.y).0;
+        let mut most = f64::NEG_INFINITY;
+        for i in -100..=100 {
+            for k in -100..=100 {
+                most = most.max(ahead([f64::from(i), f64::from(k)].map(|c| c * TAU / 100.0)));
+            }
+        }
+        assert!(ahead(got) > most - 1e-6, "{case} {angle} {got:?} {} {most}", ahead(got));
+    }
 }

@@ -294,3 +294,47 @@ fn bad_settings_name_the_argument() {
     assert_eq!(bad(&Goal { limits: vec![7.0], ..goal.clone() }), "limit");
     assert_eq!(bad(&Goal { heading: Some(f64::NAN), ..goal }), "heading");
 }
+
+/// Straight, nearly straight and too far, for many sections: the status and the nearest point.
+#[test]
+fn straight_targets_of_many_sections() {
+    for n in [4_usize, 8, 12, 16, 20, 50] {
+        let trunk = trunk(&vec![0.1; n]);
+        let whole = 0.1 * n as f64;
+        for (name, settings) in [("bends", SwarmSettings::default()), ("points", points())] {
+            let cases = [1.0, 0.9999, 0.99, 1.2];
+            let cases: Vec<(f64, u64)> =
+                cases.iter().flat_map(|share| (0..5).map(|seed| (*share, seed))).collect();
+            cases.into_par_iter().for_each(|(share, seed)| {
+                let aim = Vector2::new(share * whole, 0.0);
+                let got = solve(&trunk, &[], &to(aim), &settings, seed).inverse;
+                let what = format!("{name} {n} {share} {seed} {got:?}");
+                let status = if share > 1.0 { Status::Unreachable } else { Status::Converged };
+                assert_eq!(got.status, status, "{what}");
+                let error = (share - 1.0).max(0.0) * whole;
+                assert!((got.error - error).abs() <= 1e-12 * whole.max(1.0), "{what}");
+            });
+        }
+    }
+}
+
+/// Platforms as unknowns and no polish: the limits hold all the same, and the error is that within them.
+#[test]
+fn limits_hold_without_polish() {
+    let trunk = trunk(&[0.14, 0.12]);
+    let (mut u, mut reached) = (uniform(75), 0);
+    for seed in 0..100 {
+        let limit = 1.0;
+        let made = [limit, if seed % 2 == 0 { -limit } else { u(-1.0, 1.0) }];
+        let goal = Goal { point: tip(&trunk, &made).0, heading: None, limits: vec![limit] };
+        let settings = SwarmSettings { polish: false, tolerance: 1e-4, ..points() };
+        let got = solve(&trunk, &[], &goal, &settings, seed).inverse;
+        assert!(got.turns.iter().all(|turn| turn.abs() <= limit), "{seed} {got:?}");
+        let error = (tip(&trunk, &got.turns).0 - goal.point).norm();
+        assert!((got.error - error).abs() < 1e-15);
+        assert_eq!(got.status == Status::Converged, got.error <= 1e-4, "{seed} {got:?}");
+        reached += usize::from(got.status == Status::Converged);
+    }
+    println!("{reached} of 100 within limits");
+    assert!(reached > 50, "{reached}");
+}

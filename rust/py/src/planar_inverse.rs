@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 use tdcr::batch::pool;
 use tdcr::planar::{
     Circle, Goal, Inverse, InverseSettings, Row, SwarmInverse, SwarmSettings, SwarmSolver,
-    Unknowns, Word, inverse, inverse_rows, solve_rows,
+    Unknowns, Word, inverse, inverse_rows, inverse_until, solve_rows,
 };
 use tdcr::{InvalidInput, Status};
 
@@ -22,6 +22,9 @@ use crate::pso_settings::PsoSettings;
 
 /// How often a single search looks at signals.
 const POLL: Duration = Duration::from_millis(50);
+
+/// Newton steps times sections at most, from which on a single call listens for Ctrl-C.
+const LONG: usize = 20_000;
 
 fn newton_settings(
     tolerance: &Bound<'_, PyAny>,
@@ -142,8 +145,16 @@ pub(crate) fn _planar_newton<'py>(
     let trunk = trunk(lengths, cable_distance)?;
     let goal = one_goal(x, y, heading, limit)?;
     let settings = newton_settings(tolerance, max_iterations, starts)?;
-    let found = py.detach(|| inverse(&trunk, &goal, &settings)).map_err(|e| invalid(&e))?;
-    fields(py, found)
+    let sections = trunk.lengths().len();
+    let steps = settings.starts.saturating_mul(settings.max_iterations).saturating_mul(sections);
+    if steps < LONG {
+        let found = py.detach(|| inverse(&trunk, &goal, &settings)).map_err(|e| invalid(&e))?;
+        return fields(py, found);
+    }
+    let found =
+        long_call::run(py, None, |control| inverse_until(&trunk, &goal, &settings, &control.stop))?;
+    // Stopped only by an exception, which is raised already.
+    found.map_err(|e| invalid(&e))?.map_or_else(|| Ok(PyDict::new(py)), |found| fields(py, found))
 }
 
 /// The inverse by swarm as a dict of the fields of `tdcr.planar.PlanarInverse`.

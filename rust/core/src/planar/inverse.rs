@@ -1,5 +1,7 @@
 //! The turns of least bending energy that put the tip on a target.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nalgebra::Vector2;
 
 use super::least_energy::descend;
@@ -87,25 +89,23 @@ pub fn inverse(
     settings: &InverseSettings,
 ) -> Result<Inverse, InvalidInput> {
     let mut solver = Solver::new(trunk, goal, settings)?;
-    let mut starts = solver.exact_starts();
-    for start in &starts {
-        solver.try_start(start);
-    }
-    // Two sections without a heading: the exact solutions are all there are.
-    if solver.best.is_none() || trunk.lengths().len() != 2 || goal.heading.is_some() {
-        let spread = solver.spread_starts();
-        for start in &spread {
-            solver.try_start(start);
-        }
-        starts.extend(spread);
-    }
-    if solver.best.is_none() {
-        starts.extend(solver.nearest_start());
-        for start in &starts {
-            solver.try_nearest(start);
-        }
-    }
-    Ok(solver.answer(starts.len()))
+    let starts = solver.search();
+    Ok(solver.answer(starts))
+}
+
+/// As [`inverse`], until `stop` is set, which is looked at in every step: then there is no answer.
+///
+/// # Errors
+/// As [`inverse`].
+pub fn inverse_until(
+    trunk: &Trunk,
+    goal: &Goal,
+    settings: &InverseSettings,
+    stop: &AtomicBool,
+) -> Result<Option<Inverse>, InvalidInput> {
+    let mut solver = Solver { stop, ..Solver::new(trunk, goal, settings)? };
+    let starts = solver.search();
+    Ok((!solver.stopped()).then(|| solver.answer(starts)))
 }
 
 /// As [`inverse`], from given turns alone: the least energy near them, or the nearest point.
@@ -127,12 +127,16 @@ pub fn polish(
     Ok(solver.answer(1))
 }
 
+/// The flag of a search that nobody stops.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
 /// The problem, its buffers and the best answers so far.
 pub(super) struct Solver<'a> {
     pub(super) problem: Problem,
     pub(super) heading: Option<f64>,
     pub(super) whole: f64,
     pub(super) settings: &'a InverseSettings,
+    pub(super) stop: &'a AtomicBool,
     pub(super) work: Work,
     pub(super) iterations: usize,
     /// Energy, whether it is stationary, turns.
@@ -172,11 +176,39 @@ impl<'a> Solver<'a> {
             heading,
             whole,
             settings,
+            stop: &NEVER,
             work: Work::default(),
             iterations: 0,
             best: None,
             nearest: None,
         })
+    }
+
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Tries all starts; returns how many.
+    fn search(&mut self) -> usize {
+        let mut starts = self.exact_starts();
+        for start in &starts {
+            self.try_start(start);
+        }
+        // Two sections without a heading: the exact solutions are all there are.
+        if self.best.is_none() || self.problem.lengths.len() != 2 || self.heading.is_some() {
+            let spread = self.spread_starts();
+            for start in &spread {
+                self.try_start(start);
+            }
+            starts.extend(spread);
+        }
+        if self.best.is_none() {
+            starts.extend(self.nearest_start());
+            for start in &starts {
+                self.try_nearest(start);
+            }
+        }
+        starts.len()
     }
 
     /// Sections in two groups of one curvature each: every exact solution.
@@ -201,7 +233,7 @@ impl<'a> Solver<'a> {
 
     /// Turns spread evenly over the limits (the sequence of fractions of powers of the generalised
     /// golden ratio), the circle through the target first.
-    fn spread_starts(&self) -> Vec<Vec<f64>> {
+    pub(super) fn spread_starts(&self) -> Vec<Vec<f64>> {
         let limits = &self.problem.limits;
         let target = self.problem.target;
         let circle = 2.0 * target.im.atan2(target.re);
@@ -239,6 +271,9 @@ impl<'a> Solver<'a> {
     }
 
     pub(super) fn try_start(&mut self, start: &[f64]) {
+        if self.stopped() {
+            return;
+        }
         self.unwind(start);
         let mut turns = start.to_vec();
         self.work.held.clear();
@@ -250,6 +285,7 @@ impl<'a> Solver<'a> {
             &mut turns,
             self.settings.tolerance / self.whole,
             self.settings.max_iterations,
+            self.stop,
             &mut self.work,
         );
         self.iterations += steps;
@@ -260,6 +296,9 @@ impl<'a> Solver<'a> {
     }
 
     pub(super) fn try_nearest(&mut self, start: &[f64]) {
+        if self.stopped() {
+            return;
+        }
         self.unwind(start);
         let mut turns = start.to_vec();
         let (miss, flat) = self.problem.approach(&mut turns, &mut self.work);

@@ -1,5 +1,7 @@
 //! Down the bending energy with the tip on its target.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nalgebra::Vector3;
 
 use super::problem::{Problem, Work, eliminate};
@@ -7,43 +9,72 @@ use super::problem::{Problem, Work, eliminate};
 /// Largest gradient of the energy along the target that counts as none, over the energy's own.
 const STATIONARY: f64 = 1e-11;
 
+/// Largest share of a step that counts as none, where a limit ends it.
+const STUCK: f64 = 1e-12;
+
 /// Lowers the energy along the target: Newton steps in the turns that are free, each brought back
-/// onto the target. Returns whether it ended at a minimum, and the steps taken.
+/// onto the target. Returns whether it ended at a minimum, and the steps taken; `stop` ends it where
+/// it is.
 pub(super) fn descend(
     problem: &Problem,
     turns: &mut Vec<f64>,
     tolerance: f64,
     most: usize,
+    stop: &AtomicBool,
     work: &mut Work,
 ) -> (bool, usize) {
     let (mut energy, mut damping) = (problem.energy(turns), 0.0);
+    let mut hold = false;
     let mut trial = turns.clone();
+    // With as many free turns the target leaves no choice.
+    let choice = 2 + usize::from(problem.heading.is_some());
     for steps in 0..most {
+        if stop.load(Ordering::Relaxed) {
+            return (false, steps);
+        }
         problem.linearize(turns, work);
         let (multipliers, slope) = reduced(problem, turns, work);
-        let free = work.free.iter().filter(|free| **free).count();
-        // With two free turns the target leaves no choice.
-        let fixed = free <= 2 + usize::from(problem.heading.is_some());
-        if fixed || slope <= STATIONARY * (2.0 * energy).sqrt().max(1e-3) {
+        let mut free = work.free.iter().filter(|free| **free).count();
+        if free <= choice || slope <= STATIONARY * (2.0 * energy).sqrt().max(1e-3) {
             return (true, steps);
         }
         tangent_step(problem, turns, &multipliers, damping, work);
         trial.clone_from(turns);
-        to_the_limit(problem, &mut trial, work);
-        let on = problem.reach(&mut trial, work) <= tolerance;
+        // Where no damping helps, a turn whose limit leaves nothing of the step is held for this step.
+        while let Some(stuck) = to_the_limit(problem, &mut trial, work).filter(|_| hold) {
+            work.free[stuck] = false;
+            free -= 1;
+            if free <= choice {
+                break;
+            }
+            tangent_step(problem, turns, &multipliers, damping, work);
+            trial.clone_from(turns);
+        }
+        let used_up = hold && free <= choice;
+        let on = !used_up && problem.reach(&mut trial, work) <= tolerance;
         let next = problem.energy(&trial);
         if on && next < energy {
             let small = energy - next < 1e-15 * energy;
             std::mem::swap(turns, &mut trial);
             energy = next;
             damping *= 0.1;
+            hold = false;
             if small {
                 return (true, steps);
             }
         } else {
-            // Differences of the energy end in rounding before its gradient does.
+            // The limits leave no step.
+            if used_up {
+                return (true, steps);
+            }
             if damping > 1e8 {
-                return (slope < 1e-6 * (1.0 + energy), steps);
+                // Differences of the energy end in rounding before its gradient does.
+                let flat = slope < 1e-6 * (1.0 + energy);
+                if flat || hold {
+                    return (flat, steps);
+                }
+                (hold, damping) = (true, 0.0);
+                continue;
             }
             damping = (10.0 * damping).max(0.1);
         }
@@ -52,7 +83,8 @@ pub(super) fn descend(
 }
 
 /// Takes the step, or the part of it up to the first limit on the way; holds the turns at limits.
-fn to_the_limit(problem: &Problem, turns: &mut [f64], work: &mut Work) {
+/// Returns the turn whose limit leaves nothing of the step.
+fn to_the_limit(problem: &Problem, turns: &mut [f64], work: &mut Work) -> Option<usize> {
     let mut share = 1.0_f64;
     let mut first = None;
     for (i, (turn, step)) in turns.iter().zip(&work.step).enumerate() {
@@ -71,6 +103,7 @@ fn to_the_limit(problem: &Problem, turns: &mut [f64], work: &mut Work) {
         turns[i] = problem.limits[i].copysign(work.step[i]);
         work.held[i] = true;
     }
+    first.filter(|_| share <= STUCK)
 }
 
 /// Multipliers of the target by least squares over the free turns, and the size of the energy's

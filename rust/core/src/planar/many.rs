@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::inverse::{Goal, Inverse, InverseSettings, inverse};
+use super::inverse::{Goal, Inverse, InverseSettings, inverse_until};
 use super::trunk::Trunk;
 use super::two_section::TwoSections;
 use crate::batch::Control;
@@ -66,7 +66,7 @@ pub fn solve_many(
 /// stopped.
 ///
 /// # Errors
-/// As [`inverse`], for the first row that has any.
+/// As [`super::inverse()`], for the first row that has any.
 pub fn inverse_rows(
     trunk: &Trunk,
     goals: &[Goal],
@@ -78,9 +78,9 @@ pub fn inverse_rows(
         if control.stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
-        let answer = inverse(trunk, goal, settings)?;
-        control.done.fetch_add(1, Ordering::Relaxed);
-        Ok(Some(answer))
+        let answer = inverse_until(trunk, goal, settings, &control.stop)?;
+        control.done.fetch_add(usize::from(answer.is_some()), Ordering::Relaxed);
+        Ok(answer)
     };
     // None of a row that was stopped makes the whole None.
     pool.install(|| goals.par_iter().map(job).collect())

@@ -19,7 +19,7 @@ mod trunk;
 mod two_section;
 
 pub use clearance::Circle;
-pub use inverse::{Goal, Inverse, InverseSettings, inverse, polish};
+pub use inverse::{Goal, Inverse, InverseSettings, inverse, inverse_until, polish};
 pub use many::{ManySolutions, inverse_rows, solve_many};
 pub use spline::{AngleFunction, Curve};
 pub use swarm::{Row, Rows, SwarmInverse, SwarmSettings, SwarmSolver, Unknowns, Word, solve_rows};

@@ -7,6 +7,10 @@ use super::two_section::TwoSections;
 /// Turns per section of the grid that the search starts from.
 const GRID: usize = 41;
 
+/// Distance of a target, in lengths of the trunk, beyond which the search takes one in its direction at
+/// this distance: of longer ones the tip's part is lost in rounding.
+const FAR: f64 = 1e3;
+
 impl TwoSections {
     /// The turns (turn1, turn2) \[rad\] within the limit whose tip is nearest to (x, y) \[m\], and the
     /// distance \[m\]: the solution of least bending energy where there is one, else the best of the
@@ -21,6 +25,15 @@ impl TwoSections {
         }
         let ([l1, l2], limit) = (self.lengths(), self.limit());
         let whole = l1 + l2;
+        let distance = x.hypot(y);
+        // Halves: the distance itself may overflow.
+        if distance > FAR * whole {
+            let half = (0.5 * x).hypot(0.5 * y);
+            let part = |c: f64| 0.5 * c / half * FAR * whole;
+            let (turns, _) = self.nearest(part(x) * (1.0 - 1e-9), part(y) * (1.0 - 1e-9));
+            let tip = self.tip(turns);
+            return (turns, (tip.x - x).hypot(tip.y - y));
+        }
         let problem = Problem {
             lengths: vec![l1 / whole, l2 / whole],
             limits: vec![limit; 2],

@@ -37,6 +37,8 @@ pub(super) struct Hunt<'s, 'a> {
     circles: &'s [Circle],
     watch: &'s mut dyn FnMut(&Progress) -> Word,
     turns: Vec<f64>,
+    /// The last move.
+    last: Option<Progress>,
     /// Lowest value of the swarm in work, and its turns.
     lowest: (f64, Vec<f64>),
     /// No point of the swarm in work was evaluated yet.
@@ -87,6 +89,7 @@ impl Objective for Hunt<'_, '_> {
     }
 
     fn watch(&mut self, progress: &Progress) -> Result<bool, Abandoned> {
+        self.last = Some(*progress);
         match (self.watch)(progress) {
             Word::GoOn => {}
             Word::Finish => {
@@ -122,6 +125,7 @@ impl<'s, 'a> Hunt<'s, 'a> {
             circles,
             watch,
             turns: Vec::new(),
+            last: None,
             lowest: (f64::INFINITY, Vec::new()),
             fresh: true,
             crowd: Vec::new(),
@@ -222,12 +226,53 @@ impl<'s, 'a> Hunt<'s, 'a> {
         let most = solver.settings.max_iterations;
         solver.work.held.clear();
         let (settled, steps) =
-            descend(&solver.problem, &mut turns, tolerance, most, &mut solver.work);
+            descend(&solver.problem, &mut turns, tolerance, most, solver.stop, &mut solver.work);
         solver.iterations += steps;
         if !settled || depth(solver, &turns, self.circles) > 0.0 {
             turns = clear;
         }
         self.reached = Some((solver.problem.energy(&turns), turns));
+    }
+
+    /// Where all swarms missed the target: Newton's method from its own starts, the straight trunk, and
+    /// the straight one turned towards the target by its first section. The watcher is asked between.
+    pub(super) fn last_resort(&mut self) -> Result<(), Abandoned> {
+        if self.task != Task::Polish || self.done || self.finish {
+            return Ok(());
+        }
+        let n = self.solver.problem.lengths.len();
+        let target = self.solver.problem.target;
+        let mut towards = vec![0.0; n];
+        towards[0] = target.im.atan2(target.re);
+        let mut starts = vec![vec![0.0; n], towards];
+        starts.extend(self.solver.exact_starts());
+        starts.extend(self.solver.spread_starts());
+        for start in &starts {
+            self.try_from(start);
+            if self.done || self.asked()? {
+                return Ok(());
+            }
+        }
+        if self.reached.is_none() {
+            for start in &starts {
+                self.solver.try_nearest(start);
+                if self.asked()? {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the watcher, told of the last move again, wants the best that there is by now.
+    fn asked(&mut self) -> Result<bool, Abandoned> {
+        let Some(last) = &self.last else { return Ok(false) };
+        match (self.watch)(last) {
+            Word::GoOn => {}
+            Word::Finish => self.finish = true,
+            Word::Abandon => return Err(Abandoned),
+        }
+        Ok(self.finish)
     }
 
     /// The answer of a search from a seed, for a trunk and circles in metres; a miss up to `tolerance`
@@ -252,7 +297,11 @@ impl<'s, 'a> Hunt<'s, 'a> {
                 self.solver.try_nearest(&end.1);
             }
         } else {
-            self.solver.best = ends.into_iter().next().map(|end| (0.0, true, end.1));
+            // Limits are but a penalty where the platforms are unknown.
+            self.solver.best = ends.into_iter().next().map(|(_, mut turns)| {
+                self.solver.problem.clamp(&mut turns);
+                (0.0, true, turns)
+            });
         }
         let whole = self.solver.whole;
         let mut inverse = self.solver.answer(self.tries);

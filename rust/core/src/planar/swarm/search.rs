@@ -117,6 +117,9 @@ impl<'a> SwarmSolver<'a> {
                 break;
             }
         }
+        if hunt.last_resort().is_err() {
+            return Ok(None);
+        }
         let enough = target.unwrap_or(tolerance).max(tolerance);
         Ok(Some(hunt.answer(seed, enough, self.trunk, self.circles)))
     }
