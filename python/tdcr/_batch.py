@@ -9,6 +9,7 @@ import numpy as np
 
 from tdcr import _core
 from tdcr._progress import told
+from tdcr._value import same
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -119,7 +120,7 @@ class ShapeBatch(Sequence["Shape"]):
             (self.robot, self.model, self.settings) == (other.robot, other.model, other.settings)
             and np.array_equal(self.displacements, other.displacements)
             and self._columns.keys() == other._columns.keys()
-            and all(_same(mine, other._columns[name]) for name, mine in self._columns.items())
+            and all(same(mine, other._columns[name]) for name, mine in self._columns.items())
         )
 
     def __hash__(self) -> int:
@@ -144,12 +145,6 @@ class ShapeBatch(Sequence["Shape"]):
             f"<ShapeBatch of {len(self)} rows, {converged} converged: "
             f"fields {', '.join(self.fields) or 'none'}, model {self.model!r}>"
         )
-
-
-def _same(mine: Any, theirs: Any) -> bool:
-    if isinstance(mine, list):
-        return all(_same(a, b) for a, b in zip(mine, theirs, strict=True))
-    return np.array_equal(mine, theirs, equal_nan=mine.dtype.kind == "f")
 
 
 def forward_batch(

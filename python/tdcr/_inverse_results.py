@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
 from tdcr import _core
 from tdcr._status import Status
+from tdcr._value import Value
 from tdcr.errors import NotConverged
 
 if TYPE_CHECKING:
@@ -32,45 +33,8 @@ if TYPE_CHECKING:
 __all__ = ["Inverse", "InverseBatch"]
 
 
-class _Value:
-    """Equality field by field, arrays by their numbers; arrays read-only, also after unpickling."""
-
-    robot: Robot
-    displacements: Array
-    model: str
-
-    def __eq__(self, other: object) -> bool:
-        """Compare by value: the same robot, target, choices and answer, but for its message."""
-        if type(other) is not type(self):
-            return NotImplemented
-        mine, theirs = self.__getstate__(), other.__getstate__()
-        return all(_same(mine[name], theirs[name]) for name in mine if name != "message")
-
-    def __hash__(self) -> int:
-        """Hash by robot and displacements."""
-        # + 0.0: negative zeros are equal to zeros.
-        return hash((self.robot, self.model, (self.displacements + 0.0).tobytes()))
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the fields, without what was computed from them."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take the fields, arrays read-only."""
-        for value in state.values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-        self.__dict__.update(state)
-
-
-def _same(mine: Any, theirs: Any) -> bool:
-    if isinstance(mine, np.ndarray):
-        return np.array_equal(mine, theirs, equal_nan=mine.dtype.kind == "f")
-    return bool(mine == theirs)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class Inverse(_Value):
+class Inverse(Value):
     """Displacements that bring the tool to a target, and how it went. Arrays are read-only."""
 
     robot: Robot
@@ -99,6 +63,8 @@ class Inverse(_Value):
     method: Method
     hits: int = 1
     """How many starts led to this answer (`inverse_solutions`)."""
+
+    _hashed: ClassVar[tuple[str, ...]] = ("robot", "model", "displacements")
 
     @property
     def ok(self) -> bool:
@@ -135,7 +101,7 @@ class Inverse(_Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class InverseBatch(_Value, Sequence[Inverse]):
+class InverseBatch(Value, Sequence[Inverse]):
     """Inverses of one robot, in the order of their targets; `batch[i]` is an `Inverse`."""
 
     robot: Robot
@@ -161,6 +127,8 @@ class InverseBatch(_Value, Sequence[Inverse]):
     bounds: Bounds | None
     search: InverseSettings
     method: Method
+
+    _hashed: ClassVar[tuple[str, ...]] = ("robot", "model", "displacements")
 
     def __len__(self) -> int:
         """Return the number of targets B."""

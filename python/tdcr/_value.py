@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-__all__ = ["Value", "rebuilt"]
+__all__ = ["Value", "rebuilt", "same"]
 
 
 class Value:
@@ -20,7 +20,7 @@ class Value:
         if type(other) is not type(self):
             return NotImplemented
         mine, theirs = self.__getstate__(), other.__getstate__()
-        return all(_same(mine[name], theirs[name]) for name in mine if name != "message")
+        return all(same(mine[name], theirs[name]) for name in mine if name != "message")
 
     def __hash__(self) -> int:
         """Hash by the fields that tell one from another."""
@@ -46,7 +46,10 @@ def _read_only(value: Any) -> Any:
     return value
 
 
-def _same(mine: Any, theirs: Any) -> bool:
+def same(mine: Any, theirs: Any) -> bool:
+    """Compare arrays by their numbers, NaN to NaN, lists item by item, anything else as it is."""
+    if isinstance(mine, list) and isinstance(theirs, list):
+        return len(mine) == len(theirs) and all(map(same, mine, theirs))
     if isinstance(mine, np.ndarray) and isinstance(theirs, np.ndarray):
         return np.array_equal(mine, theirs, equal_nan=mine.dtype.kind == "f")
     if isinstance(mine, np.ndarray) or isinstance(theirs, np.ndarray):
