@@ -121,7 +121,7 @@ pub fn left_jacobian_inverse_derivative(w: &Vector3<f64>, x: &Vector3<f64>) -> M
 /// Written out so that the diagonal is `1 − square (y² + z²)`: a rotation about a coordinate axis
 /// then leaves that axis exactly alone.
 #[rustfmt::skip] // the matrix looks like one
-fn quadratic(w: &Vector3<f64>, linear: f64, square: f64) -> Matrix3<f64> {
+pub(crate) fn quadratic(w: &Vector3<f64>, linear: f64, square: f64) -> Matrix3<f64> {
     let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
     let (xy, yz, zx) = (square * w.x * w.y, square * w.y * w.z, square * w.z * w.x);
     let turn = linear * w;

@@ -43,8 +43,8 @@ impl Element {
         let a = Coefficient(a, c - b, c1 - b1);
         let b = Coefficient(b, b1, angle.b_bend());
         let c = Coefficient(c, c1, angle.c_bend());
-        let rotation = quadratic(&strain, a.0, b.0);
-        let spin = quadratic(&strain, b.0, c.0);
+        let rotation = so3::quadratic(&strain, a.0, b.0);
+        let spin = so3::quadratic(&strain, b.0, c.0);
         let (translation, sweep) = match kind {
             Subsegment::Arc => (spin.column(2) * length, arc_sweep(&strain, b, c) * length),
             Subsegment::Link => {
@@ -88,17 +88,6 @@ impl Element {
 /// `M + Mᵀ − 2 tr(M) I`: `½ w·Q w` is then `u·(w × (w × x))` for `M = u xᵀ`.
 fn symmetric(dyad: &Matrix3<f64>) -> Matrix3<f64> {
     dyad + dyad.transpose() - Matrix3::from_diagonal_element(2.0 * dyad.trace())
-}
-
-/// `I + linear W + square W²`.
-fn quadratic(w: &Vector3<f64>, linear: f64, square: f64) -> Matrix3<f64> {
-    let hat = so3::hat(&(w * linear));
-    let mut out = (w * w.transpose()) * square + hat;
-    let diagonal = 1.0 - square * w.norm_squared();
-    for k in 0..3 {
-        out[(k, k)] += diagonal;
-    }
-    out
 }
 
 /// Derivative of `V(w) z` by `w`.

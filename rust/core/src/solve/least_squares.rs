@@ -10,8 +10,6 @@ const DEFICIENT: f64 = 1e-10;
 pub struct PseudoInverse {
     /// The inverse itself: columns x rows of the matrix.
     pub matrix: DMatrix<f64>,
-    /// Number of singular values that count.
-    pub rank: usize,
     /// Largest over smallest singular value that counts; 1 for an empty matrix.
     pub condition: f64,
 }
@@ -23,17 +21,15 @@ impl PseudoInverse {
         let (rows, columns) = matrix.shape();
         let mut inverse = DMatrix::zeros(columns, rows);
         if rows == 0 || columns == 0 {
-            return Self { matrix: inverse, rank: 0, condition: 1.0 };
+            return Self { matrix: inverse, condition: 1.0 };
         }
         let decomposition = matrix.clone().svd(true, true);
         let values = &decomposition.singular_values;
         let largest = values.max();
-        let mut rank = 0;
         let mut smallest = largest;
         if let (Some(u), Some(v)) = (&decomposition.u, &decomposition.v_t) {
             for (k, &value) in values.iter().enumerate() {
                 if value > DEFICIENT * largest {
-                    rank += 1;
                     smallest = smallest.min(value);
                     inverse += v.row(k).transpose() * u.column(k).transpose() / value;
                 }
@@ -43,8 +39,8 @@ impl PseudoInverse {
         // converges quadratically and keeps the rank, leaves the rounding.
         let twice = &inverse * 2.0;
         inverse = twice - &inverse * matrix * &inverse;
-        let condition = if rank > 0 { largest / smallest } else { 1.0 };
-        Self { matrix: inverse, rank, condition }
+        let condition = if largest > 0.0 { largest / smallest } else { 1.0 };
+        Self { matrix: inverse, condition }
     }
 
     /// The least-squares answer of minimum norm.
