@@ -46,7 +46,7 @@ fn every_determinate_case_is_met_at_every_disk() {
         let pulls: Vec<f64> =
             given.iter().zip(&taut).map(|(d, t)| if *t { *d } else { f64::INFINITY }).collect();
         let elements = count(&case["elements"]);
-        let plan = Plan::new(&robot, RodSettings { elements, ..Default::default() });
+        let plan = Plan::new(&robot, RodSettings { elements, ..Default::default() }).unwrap();
         let shape = Rod::new(&robot, &plan).shape(&pulls).unwrap();
         assert_eq!(shape.report.status, Status::Converged, "{}: {}", case["id"], shape.message);
         assert!(shape.report.residual < 1e-11, "{}", case["id"]);

@@ -9,4 +9,4 @@ mod subsegment;
 
 pub use model::{Rod, Workspace};
 pub use plan::Plan;
-pub use settings::{RodSettings, Subsegment};
+pub use settings::{RodSettings, Subsegment, TendonRule};

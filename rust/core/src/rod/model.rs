@@ -94,6 +94,54 @@ impl<'r> Rod<'r> {
         Ok(Report { status, residual: work.left.worst(), iterations })
     }
 
+    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
+    /// elements; a start that does not help is dropped.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a start with another number of strains or tensions.
+    pub fn solve_from(
+        &self,
+        start: &State,
+        displacements: &[f64],
+        work: &mut Workspace,
+    ) -> Result<Report, InvalidInput> {
+        let elements = self.plan.data.len() * self.plan.settings.elements;
+        if start.strains.len() != elements {
+            let expected = format!("{elements} strains, one per element");
+            return Err(InvalidInput::new("start", expected, start.strains.len()));
+        }
+        work.chain.rest(self.plan);
+        for (own, strain) in work.chain.strains.chunks_exact_mut(3).zip(&start.strains) {
+            own.copy_from_slice(strain.as_slice());
+        }
+        for (own, tension) in work.chain.tensions.iter_mut().zip(&start.tensions) {
+            *own = if tension.is_finite() { tension / self.plan.unit } else { 0.0 };
+        }
+        self.resume(displacements, work)
+    }
+
+    /// Solves for displacements from what the last solve of this plan left in `work`.
+    ///
+    /// # Errors
+    /// As [`Model::solve`].
+    pub fn resume(
+        &self,
+        displacements: &[f64],
+        work: &mut Workspace,
+    ) -> Result<Report, InvalidInput> {
+        let mut budget = self.plan.settings.max_iterations;
+        work.bounds.clear();
+        let rest = self.plan.rest_lengths.iter();
+        work.bounds.extend(rest.zip(displacements).map(|(length, d)| length + d));
+        if work.chain.tensions.len() != displacements.len() || !self.newton(work, &mut budget) {
+            return self.solve(displacements, work);
+        }
+        work.load = 1.0;
+        self.report(work);
+        let iterations = self.plan.settings.max_iterations - budget;
+        Ok(Report { status: Status::Converged, residual: work.left.worst(), iterations })
+    }
+
     /// Newton's method from the point at hand; whether it converged to a minimum.
     fn newton(&self, work: &mut Workspace, budget: &mut usize) -> bool {
         let mut before = f64::INFINITY;

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::settings::RodSettings;
 use super::subsegment::{Data, Local, Piece};
+use crate::error::InvalidInput;
 use crate::robot::Robot;
 
 /// A robot prepared for the rod model.
@@ -22,10 +23,28 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Prepares a robot; settings are validated.
-    #[must_use]
-    pub fn new(robot: &Robot, settings: RodSettings) -> Self {
+    /// Prepares a robot.
+    ///
+    /// # Errors
+    /// `InvalidInput` for settings out of range, and for stretching elements or elastic tendons of a backbone
+    /// without Young's modulus: their stiffness would have nothing to be compared with.
+    pub fn new(robot: &Robot, settings: RodSettings) -> Result<Self, InvalidInput> {
+        settings.validate()?;
         let backbone = robot.backbone();
+        if !backbone.has_stiffness() {
+            if settings.axial {
+                let expected =
+                    "Young's modulus and diameter of the backbone (axial strain needs EA)";
+                return Err(InvalidInput::new("youngs_modulus", expected, "none"));
+            }
+            if let Some(tendon) = robot.tendons().iter().position(|t| t.stiffness().is_some()) {
+                let name = &robot.tendon_names()[tendon];
+                let expected = format!(
+                    "Young's modulus and diameter of the backbone, as tendon '{name}' has a stiffness [N]"
+                );
+                return Err(InvalidInput::new("youngs_modulus", expected, "none"));
+            }
+        }
         let (n, elements) = (backbone.subsegments(), settings.elements as f64);
         let poisson = backbone.spec().poisson_ratio;
         let unit = backbone.bending_stiffness(0) / backbone.total_length();
@@ -47,7 +66,7 @@ impl Plan {
         starts.push(pieces.len());
         let mut plan = Self { settings, data, pieces, starts, rest_lengths: Vec::new(), unit };
         plan.rest_lengths = plan.lengths_at_rest(robot.paths().len());
-        plan
+        Ok(plan)
     }
 
     /// Lengths through these elements: links cut corners that arcs round.
