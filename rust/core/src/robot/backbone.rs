@@ -180,14 +180,23 @@ impl Backbone {
     /// in units of the base subsegment's.
     #[must_use]
     pub fn bending_stiffness(&self, subsegment: usize) -> f64 {
-        let diameter = |i: usize| {
-            (self.spec.diameter.as_ref()).map(|d| if d.len() == 1 { d[0] } else { d[i] })
-        };
-        match (self.spec.youngs_modulus, diameter(subsegment), diameter(0)) {
+        match (self.spec.youngs_modulus, self.diameter(subsegment), self.diameter(0)) {
             (Some(modulus), Some(d), _) => modulus * PI * d.powi(4) / 64.0,
             (None, Some(d), Some(base)) => (d / base).powi(4),
             _ => 1.0,
         }
+    }
+
+    /// Axial stiffness EA of a subsegment \[N\], where Young's modulus is known.
+    #[must_use]
+    pub fn axial_stiffness(&self, subsegment: usize) -> Option<f64> {
+        let diameter = self.diameter(subsegment)?;
+        Some(self.spec.youngs_modulus? * PI * diameter * diameter / 4.0)
+    }
+
+    fn diameter(&self, subsegment: usize) -> Option<f64> {
+        let diameter = self.spec.diameter.as_ref()?;
+        Some(if diameter.len() == 1 { diameter[0] } else { diameter[subsegment] })
     }
 
     /// Strain energy of a rotation vector in a subsegment \[J, or 1/m in units of EI\]:

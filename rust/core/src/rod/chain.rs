@@ -6,35 +6,45 @@
 //! becomes negative.
 
 use super::plan::Plan;
-use super::subsegment::{Derivatives, Local};
+use super::subsegment::{Derivatives, Local, ROUNDING};
+use crate::lie::Pose;
 use crate::solve::quadratic::{Outcome, Quadratic, Rows, backward, cholesky, dot, forward};
 
 /// Unknowns and the buffers of a Newton step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Chain {
-    /// Rotation vectors of all elements, base first \[rad\].
+    /// Strains of all elements, base first: rotation vector \[rad\], and elongation where there is one.
     pub(super) strains: Vec<f64>,
     /// Tensions, in the plan's unit.
     pub(super) tensions: Vec<f64>,
-    /// Length of every tendon at the strains evaluated last \[m\].
-    pub(super) lengths: Vec<f64>,
+    /// Longest that each tendon may be without tension \[m\]; infinite: free.
+    pub(super) bounds: Vec<f64>,
+    /// Tendons that count: not free, or under a given tension.
+    pub(super) taut: Vec<bool>,
+    /// What the tendons that count are longer than their bounds and elasticity allow \[m\], at the point
+    /// assembled last.
+    pub(super) over: Vec<f64>,
+    /// The same once the subsegments have found their balance, to first order: the slope of the dual.
+    pub(super) slope: Vec<f64>,
+    /// Compliance that all tendons have besides their own \[m per unit of tension\].
+    pub(super) give: f64,
+    /// Steps of the tensions and of the strains.
+    pub(super) pulls: Vec<f64>,
+    pub(super) step: Vec<f64>,
+    /// Frame of every subsegment's end in its base disk's.
+    pub(super) ends: Vec<Pose>,
     pub(super) local: Local,
     /// Per subsegment: the Hessian's factor, and `L⁻¹` times the gradient.
-    factors: Vec<f64>,
-    gradients: Vec<f64>,
+    pub(super) factors: Vec<f64>,
+    pub(super) gradients: Vec<f64>,
     /// `L⁻¹ A`, one row per piece.
-    images: Vec<f64>,
-    pieces: Vec<f64>,
-    schur: Vec<f64>,
-    right: Vec<f64>,
+    pub(super) images: Vec<f64>,
+    lengths: Vec<f64>,
+    /// `Σ A H⁻¹ Aᵀ` and the tendons' compliance.
+    pub(super) schur: Vec<f64>,
+    reduced: Vec<f64>,
     program: Quadratic,
     rows: Rows,
-    /// Steps of the strains and of the tensions.
-    step: Vec<f64>,
-    /// Tendons that are not free.
-    taut: Vec<usize>,
-    /// Step of every tension.
-    pulls: Vec<f64>,
     whole: Vec<f64>,
 }
 
@@ -47,6 +57,10 @@ pub(super) struct Left {
     pub(super) length: f64,
     /// Every subsegment is at a minimum, given the tensions.
     pub(super) stable: bool,
+    /// Evaluations of all subsegments.
+    pub(super) rounds: usize,
+    /// Furthest that a subsegment went by itself \[rad\].
+    pub(super) moved: f64,
 }
 
 impl Left {
@@ -57,115 +71,172 @@ impl Left {
 
 /// A subsegment whose Hessian is not positive definite gets this share of its stiffness, and more.
 const SHIFT: f64 = 1e-3;
+/// Steps that a subsegment off balance gets at most.
+const RELAXATIONS: usize = 30;
 /// Share of the Schur complement's trace that keeps dependent tendons from exploding.
-const RIDGE: f64 = 1e-14;
+pub(super) const RIDGE: f64 = 1e-14;
 
 impl Chain {
     /// The rest shape without tensions.
     pub(super) fn rest(&mut self, plan: &Plan) {
         self.strains.clear();
+        let (width, elements) = (plan.unknowns(), plan.settings.elements);
         for data in &plan.data {
-            for _ in 0..plan.settings.elements {
-                self.strains.extend_from_slice(data.rest.as_slice());
+            for _ in 0..elements {
+                self.strains.extend_from_slice(&data.rest[..width]);
             }
         }
         self.tensions.clear();
         self.tensions.resize(plan.rest_lengths.len(), 0.0);
     }
 
-    /// Derivatives, factors and the Schur complement at the point at hand; what is left there for lengths of
-    /// at most `bounds` (infinite: free).
-    pub(super) fn assemble(&mut self, plan: &Plan, bounds: &[f64]) -> Left {
-        let (size, tendons) = (plan.width(), bounds.len());
+    /// Derivatives, factors and the Schur complement at the point at hand, and what is left there. Subsegments
+    /// that are off balance by more than `balance` \[rad of their own stiffness\] are brought nearer first, each by itself.
+    pub(super) fn assemble(&mut self, plan: &Plan, balance: f64) -> Left {
+        let (size, tendons) = (plan.width(), self.bounds.len());
         self.factors.resize(plan.data.len() * size * size, 0.0);
         self.gradients.resize(plan.data.len() * size, 0.0);
         self.images.resize(plan.pieces.len() * size, 0.0);
-        self.pieces.resize(plan.pieces.len(), 0.0);
-        self.lengths.clear();
-        self.lengths.resize(tendons, 0.0);
+        self.lengths.resize(plan.pieces.len(), 0.0);
         self.schur.clear();
         self.schur.resize(tendons * tendons, 0.0);
-        self.right.clear();
-        self.right.resize(tendons, 0.0);
-        let mut left = Left { stable: true, ..Left::default() };
-        for (i, data) in plan.data.iter().enumerate() {
-            let (first, last) = (plan.starts[i], plan.starts[i + 1]);
-            let strains = &self.strains[i * size..(i + 1) * size];
-            let factor = &mut self.factors[i * size * size..(i + 1) * size * size];
-            let gradient = &mut self.gradients[i * size..(i + 1) * size];
-            let images = &mut self.images[first * size..last * size];
-            self.local.place(plan.settings.subsegment, data, strains);
-            let mut out = Derivatives {
-                gradient,
-                hessian: factor,
-                rows: images,
-                lengths: &mut self.pieces[first..last],
-            };
-            let pieces = &plan.pieces[first..last];
-            self.local.differentiate(data, pieces, strains, &self.tensions, &mut out);
-            let largest = gradient.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
-            left.moment = left.moment.max(largest / data.stiffness.x);
-            left.stable &= factorize(factor, &mut self.whole, size, data.stiffness.x);
-            forward(factor, size, gradient);
-            for (k, piece) in pieces.iter().enumerate() {
-                self.lengths[piece.tendon] += self.pieces[first + k];
-                let image = &mut images[k * size..(k + 1) * size];
-                forward(factor, size, image);
-                self.right[piece.tendon] -= dot(image, gradient);
-            }
-            for (k, piece) in pieces.iter().enumerate() {
-                let image = &images[k * size..(k + 1) * size];
-                for (l, other) in pieces[..=k].iter().enumerate() {
-                    let product = dot(image, &images[l * size..(l + 1) * size]);
-                    self.schur[piece.tendon * tendons + other.tendon] += product;
-                }
-            }
-        }
-        for (k, bound) in bounds.iter().enumerate() {
-            let over = self.lengths[k] - bound;
-            self.right[k] += over;
-            let off = if self.tensions[k] > 0.0 { over.abs() } else { over.max(0.0) };
+        self.slope.clear();
+        self.slope.resize(tendons, 0.0);
+        self.over.clear();
+        self.over.resize(tendons, 0.0);
+        self.ends.clear();
+        let mut left = match (plan.unknowns(), plan.settings.elements) {
+            (3, 1) => self.differentiate::<3, true>(plan, balance),
+            (3, _) => self.differentiate::<3, false>(plan, balance),
+            (_, 1) => self.differentiate::<4, true>(plan, balance),
+            _ => self.differentiate::<4, false>(plan, balance),
+        };
+        for (k, bound) in self.bounds.iter().enumerate() {
             if bound.is_finite() {
-                left.length = left.length.max(off / plan.rest_lengths[k]);
+                let give = plan.compliance[k] + self.give;
+                let over = self.over[k] - bound - give * self.tensions[k];
+                self.schur[k * (tendons + 1)] += give;
+                self.over[k] = over;
+                self.slope[k] += over;
+                let relative = over / plan.rest_lengths[k];
+                // A tendon is as long as it may be, or slack.
+                let off = if plan.signed {
+                    relative.abs()
+                } else {
+                    relative.max((-relative).min(self.tensions[k] * plan.slenderness))
+                };
+                left.length = left.length.max(off);
             }
         }
         left
     }
 
-    /// The Newton step at the point assembled last; false when the program has no solution.
-    pub(super) fn solve(&mut self, plan: &Plan, bounds: &[f64]) -> bool {
-        let (size, tendons) = (plan.width(), bounds.len());
-        self.taut.clear();
-        self.taut.extend((0..tendons).filter(|k| bounds[*k].is_finite()));
-        let count = self.taut.len();
-        let trace: f64 = self.taut.iter().map(|k| self.schur[k * (tendons + 1)]).sum();
-        let mut reduced = std::mem::take(&mut self.step);
-        reduced.clear();
-        reduced.resize(count * count, 0.0);
-        self.program.gradient.clear();
-        self.rows.clear();
-        for (a, &k) in self.taut.iter().enumerate() {
-            for (b, &l) in self.taut[..=a].iter().enumerate() {
-                reduced[a * count + b] = self.schur[k * tendons + l];
+    fn differentiate<const D: usize, const ONE: bool>(
+        &mut self,
+        plan: &Plan,
+        balance: f64,
+    ) -> Left {
+        let size = if ONE { D } else { plan.width() };
+        let kind = plan.settings.subsegment;
+        let tendons = self.bounds.len();
+        let mut left = Left { stable: true, ..Left::default() };
+        for (i, data) in plan.data.iter().enumerate() {
+            let (first, last) = (plan.starts[i], plan.starts[i + 1]);
+            let pieces = &plan.pieces[first..last];
+            let strains = &mut self.strains[i * size..(i + 1) * size];
+            let images = &mut self.images[first * size..last * size];
+            let mut out = Derivatives {
+                gradient: &mut self.gradients[i * size..(i + 1) * size],
+                hessian: &mut self.factors[i * size * size..(i + 1) * size * size],
+                rows: images,
+                lengths: &mut self.lengths[first..last],
+            };
+            let (tensions, taut) = (&self.tensions, &self.taut);
+            let (mut moved, mut round) = (0.0, 0);
+            loop {
+                self.local.place::<D>(kind, data, strains);
+                self.local.differentiate::<D, ONE>(data, pieces, strains, tensions, taut, &mut out);
+                let stable = factorize(out.hessian, &mut self.whole, size, data.stiffness[0]);
+                let mut largest = 0.0_f64;
+                for (k, g) in out.gradient.iter().enumerate() {
+                    largest = largest.max(g.abs() / data.stiffness[k % D]);
+                }
+                round += 1;
+                let far = largest > balance || (!stable && largest > 1e-9);
+                let went = if far && round <= RELAXATIONS {
+                    self.local.relax::<D>(kind, data, pieces, strains, tensions, &out)
+                } else {
+                    None
+                };
+                if let Some(step) = went {
+                    moved += step;
+                    continue;
+                }
+                left.moment = left.moment.max(largest);
+                if largest.is_nan() {
+                    left.moment = f64::NAN;
+                }
+                left.stable &= stable;
+                break;
             }
-            reduced[a * (count + 1)] += RIDGE * trace + f64::MIN_POSITIVE;
-            self.program.gradient.push(-self.right[k]);
+            left.rounds = left.rounds.max(round);
+            left.moved = left.moved.max(moved);
+            self.ends.push(self.local.end());
+            let Derivatives { gradient, hessian: factor, rows: images, lengths } = out;
+            forward(factor, size, gradient);
+            for (k, piece) in pieces.iter().enumerate() {
+                if !taut[piece.tendon] {
+                    continue;
+                }
+                self.over[piece.tendon] += lengths[k];
+                let (before, image) = images.split_at_mut(k * size);
+                let image = &mut image[..size];
+                forward(factor, size, image);
+                self.slope[piece.tendon] -= dot(image, gradient);
+                let row = &mut self.schur[piece.tendon * tendons..(piece.tendon + 1) * tendons];
+                for (other, earlier) in pieces.iter().zip(before.chunks_exact(size)) {
+                    if taut[other.tendon] {
+                        row[other.tendon] += dot(image, earlier);
+                    }
+                }
+                row[piece.tendon] += dot(image, image);
+            }
         }
-        for (a, &k) in self.taut.iter().enumerate() {
-            let tension = self.tensions[k];
-            self.rows.push(count, tension)[a] = -1.0;
+        left
+    }
+
+    /// Puts subsegments back to earlier strains where these are better under the tensions at hand.
+    pub(super) fn choose(&mut self, plan: &Plan, earlier: &[f64]) {
+        match plan.unknowns() {
+            3 => self.choose_of::<3>(plan, earlier),
+            _ => self.choose_of::<4>(plan, earlier),
         }
-        let solved = self.program.factor(&reduced, count)
-            && self.program.solve(&self.rows) == Outcome::Solved;
-        self.step = reduced;
-        if !solved {
+    }
+
+    fn choose_of<const D: usize>(&mut self, plan: &Plan, earlier: &[f64]) {
+        let (size, kind) = (plan.width(), plan.settings.subsegment);
+        let rows = self.strains.chunks_exact_mut(size).zip(earlier.chunks_exact(size));
+        for (i, (own, earlier)) in rows.enumerate() {
+            let (data, pieces) = (&plan.data[i], &plan.pieces[plan.starts[i]..plan.starts[i + 1]]);
+            let mut value = |strains: &[f64]| {
+                self.local.place::<D>(kind, data, strains);
+                self.local.value::<D>(data, pieces, strains, &self.tensions)
+            };
+            let (before, after) = (value(earlier), value(own));
+            // Rounding decides nothing.
+            if after.is_nan() || after > before + ROUNDING * before.abs() {
+                own.copy_from_slice(earlier);
+            }
+        }
+    }
+
+    /// The Newton step at the point assembled last, with a share `ridge` of the Schur complement's trace added
+    /// to its diagonal; false when the program has no solution.
+    pub(super) fn solve(&mut self, plan: &Plan, ridge: f64) -> bool {
+        if !self.solve_tensions(plan, ridge) {
             return false;
         }
-        self.pulls.clear();
-        self.pulls.resize(tendons, 0.0);
-        for (a, &k) in self.taut.iter().enumerate() {
-            self.pulls[k] = self.program.step[a];
-        }
+        let size = plan.width();
         self.step.clear();
         for i in 0..plan.data.len() {
             let factor = &self.factors[i * size * size..(i + 1) * size * size];
@@ -174,9 +245,11 @@ impl Chain {
             let place = &mut self.step[start..];
             for p in plan.starts[i]..plan.starts[i + 1] {
                 let pull = self.pulls[plan.pieces[p].tendon];
-                let image = &self.images[p * size..(p + 1) * size];
-                for (s, y) in place.iter_mut().zip(image) {
-                    *s -= pull * y;
+                if pull != 0.0 {
+                    let image = &self.images[p * size..(p + 1) * size];
+                    for (s, y) in place.iter_mut().zip(image) {
+                        *s -= pull * y;
+                    }
                 }
             }
             backward(factor, size, place);
@@ -184,42 +257,92 @@ impl Chain {
         self.step.iter().all(|s| s.is_finite())
     }
 
+    /// The step of the tensions.
+    fn solve_tensions(&mut self, plan: &Plan, ridge: f64) -> bool {
+        let tendons = self.bounds.len();
+        self.pulls.clear();
+        self.pulls.resize(tendons, 0.0);
+        let bounded = |k: &usize| self.bounds[*k].is_finite();
+        let count = (0..tendons).filter(bounded).count();
+        let trace: f64 = (0..tendons).filter(bounded).map(|k| self.schur[k * (tendons + 1)]).sum();
+        let ridge = ridge * trace + f64::MIN_POSITIVE;
+        self.reduced.clear();
+        self.program.gradient.clear();
+        self.rows.clear();
+        for k in (0..tendons).filter(bounded) {
+            for l in (0..=k).filter(bounded) {
+                self.reduced.push(self.schur[k * tendons + l]);
+            }
+            let a = self.program.gradient.len();
+            if let Some(diagonal) = self.reduced.last_mut() {
+                *diagonal += ridge;
+            }
+            self.reduced.resize((a + 1) * count, 0.0);
+            self.program.gradient.push(-self.slope[k]);
+            if !plan.signed {
+                self.rows.push(count, self.tensions[k])[a] = -1.0;
+            }
+        }
+        if !(self.program.factor(&self.reduced, count)
+            && self.program.solve(&self.rows) == Outcome::Solved)
+        {
+            return false;
+        }
+        for (a, k) in (0..tendons).filter(bounded).enumerate() {
+            // Exactly slack, not nearly.
+            let slack = self.program.active.contains(&a);
+            let least = if plan.signed { f64::NEG_INFINITY } else { -self.tensions[k] };
+            self.pulls[k] = if slack { least } else { self.program.step[a].max(least) };
+        }
+        true
+    }
+
+    /// What a unit of tension shortens the tendons by, at most, at the point assembled last \[m\].
+    pub(super) fn softness(&self) -> f64 {
+        let tendons = self.bounds.len();
+        (0..tendons).fold(0.0_f64, |most, k| most.max(self.schur[k * (tendons + 1)]))
+    }
+
     /// Longest step of a strain \[rad\].
     pub(super) fn longest(&self) -> f64 {
         self.step.iter().fold(0.0_f64, |most, s| most.max(s.abs()))
     }
 
-    /// Takes a share of the step.
-    pub(super) fn take(&mut self, share: f64) {
-        for (strain, step) in self.strains.iter_mut().zip(&self.step) {
-            *strain += share * step;
-        }
-        for (tension, pull) in self.tensions.iter_mut().zip(&self.pulls) {
-            // Rounding leaves no tension below zero.
-            *tension = (*tension + share * pull).max(0.0);
-        }
+    /// Growth of the dual along the step of the tensions, per share of it.
+    pub(super) fn growth(&self, pulls: &[f64]) -> f64 {
+        let bounded = self.bounds.iter().zip(&self.slope).zip(pulls);
+        bounded.filter(|((b, _), _)| b.is_finite()).map(|((_, slope), pull)| slope * pull).sum()
     }
 }
 
 /// Factors a Hessian, raised until it is positive definite; whether it was.
+#[inline(always)]
 fn factorize(hessian: &mut [f64], whole: &mut Vec<f64>, size: usize, stiffness: f64) -> bool {
     whole.clear();
     whole.extend_from_slice(hessian);
-    let mut shift = 0.0_f64;
+    cholesky(hessian, size) || {
+        raise(hessian, whole, size, stiffness);
+        false
+    }
+}
+
+#[cold]
+fn raise(hessian: &mut [f64], whole: &[f64], size: usize, stiffness: f64) {
+    let mut shift = SHIFT * stiffness;
     loop {
-        if cholesky(hessian, size) {
-            return shift == 0.0;
-        }
-        shift = (2.0 * shift).max(SHIFT * stiffness);
         hessian.copy_from_slice(whole);
         if shift > 1e9 * stiffness || shift.is_nan() {
             // Not a number somewhere: the caller sees it in the residual.
             hessian.fill(0.0);
             (0..size).for_each(|k| hessian[k * (size + 1)] = 1.0 / stiffness.sqrt());
-            return false;
+            return;
         }
         for k in 0..size {
             hessian[k * (size + 1)] += shift;
         }
+        if cholesky(hessian, size) {
+            return;
+        }
+        shift *= 2.0;
     }
 }

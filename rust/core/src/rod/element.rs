@@ -19,8 +19,9 @@ struct Coefficient(f64, f64, f64);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Element {
     strain: Vector3<f64>,
-    /// \[m\]
+    /// Stretched \[m\]
     length: f64,
+    elongation: f64,
     kind: Subsegment,
     a: Coefficient,
     b: Coefficient,
@@ -33,9 +34,23 @@ pub(super) struct Element {
     pub(super) sweep: Matrix3<f64>,
 }
 
+impl Default for Element {
+    fn default() -> Self {
+        Self::new(Subsegment::Arc, 1.0, Vector3::zeros(), 0.0)
+    }
+}
+
 impl Element {
-    /// An element of a length \[m\] that turns by a rotation vector \[rad\].
-    pub(super) fn new(kind: Subsegment, length: f64, strain: Vector3<f64>) -> Self {
+    /// An element of a rest length \[m\] that turns by a rotation vector \[rad\] and becomes longer by a
+    /// share `elongation`.
+    #[inline]
+    pub(super) fn new(
+        kind: Subsegment,
+        length: f64,
+        strain: Vector3<f64>,
+        elongation: f64,
+    ) -> Self {
+        let length = length * (1.0 + elongation);
         let angle = Angle::of(&strain);
         let (a, b, c) = (angle.a(), angle.b(), angle.c());
         let (b1, c1) = (angle.b_slope(), angle.c_slope());
@@ -57,11 +72,24 @@ impl Element {
             }
         };
         let end = Pose { rotation, translation };
-        Self { strain, length, kind, a, b, c, end, spin, sweep }
+        Self { strain, length, elongation, kind, a, b, c, end, spin, sweep }
+    }
+
+    /// Velocity of its end by the elongation \[m\].
+    #[inline]
+    pub(super) fn stretch(&self) -> Vector3<f64> {
+        self.end.translation / (1.0 + self.elongation)
+    }
+
+    /// Derivative by the strain of the work of a force on [`Self::stretch`].
+    #[inline]
+    pub(super) fn stretch_slope(&self, force: &Vector3<f64>) -> Vector3<f64> {
+        self.sweep.tr_mul(force) / (1.0 + self.elongation)
     }
 
     /// Second derivatives by the strain of `sum u·(origin + Exp(w) x)` over tendons, given the sums of
     /// `u`, of `x × u` and of `u xᵀ`.
+    #[inline]
     pub(super) fn curvature(
         &self,
         force: &Vector3<f64>,
@@ -145,12 +173,15 @@ mod tests {
             for size in [0.0, 1e-5, 0.3, 2.0] {
                 let (strain, u, x) =
                     (vector(&mut seed) * size, vector(&mut seed), vector(&mut seed));
-                let at = |w: Vector3<f64>| Element::new(kind, 0.7, w);
+                let at = |w: Vector3<f64>| Element::new(kind, 0.7, w, -0.1);
                 let value = |w: Vector3<f64>| u.dot(&at(w).end.transform(&x));
                 let slope = |w: Vector3<f64>| {
                     let e = at(w);
                     e.spin.transpose() * (e.end.rotation * x).cross(&u) + e.sweep.transpose() * u
                 };
+                let stretched = Element::new(kind, 0.7, strain, -0.1 + 1e-5).end.translation;
+                let difference = (stretched - at(strain).end.translation) / 1e-5;
+                assert!((difference - at(strain).stretch()).amax() < 1e-9, "{kind:?} {size}");
                 let hessian = at(strain).curvature(&u, &x.cross(&u), &(u * x.transpose()));
                 for k in 0..3 {
                     let step = Vector3::ith(k, 1e-5);

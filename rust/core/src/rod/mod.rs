@@ -1,9 +1,12 @@
 //! The strain-energy rod: general routing, pre-bent backbones, any number of tendons.
 
+mod ascent;
 mod chain;
 mod element;
+mod message;
 mod model;
 mod plan;
+mod proportional;
 mod settings;
 mod subsegment;
 

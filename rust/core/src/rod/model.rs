@@ -1,9 +1,12 @@
-//! The rod as a forward model: load steps around Newton's method, and its results.
+//! The rod as a forward model: from displacements or tensions to results.
 
 use nalgebra::Vector3;
 
+use super::ascent::{Ascent, EASY, Ending};
 use super::chain::{Chain, Left};
+use super::message::message;
 use super::plan::Plan;
+use super::settings::TendonRule;
 use crate::error::InvalidInput;
 use crate::model::{Model, Report, State};
 use crate::robot::Robot;
@@ -12,29 +15,30 @@ use crate::status::Status;
 /// Buffers of a solve.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
-    state: State,
-    chain: Chain,
-    /// Strains and tensions at the last load that was reached.
-    reached: (Vec<f64>, Vec<f64>),
-    bounds: Vec<f64>,
-    left: Left,
-    /// Share of the displacements that was reached.
-    load: f64,
+    pub(super) state: State,
+    pub(super) chain: Chain,
+    /// One subsegment, where displacements are proportional.
+    pub(super) part: Chain,
+    pub(super) ascent: Ascent,
+    pub(super) left: Left,
+    pub(super) ending: Ending,
+    /// Strains at the last load that was reached, where tensions are given.
+    reached: Vec<f64>,
 }
 
 /// The rod model of a robot, ready to solve.
 #[derive(Clone, Debug)]
 pub struct Rod<'r> {
-    robot: &'r Robot,
-    plan: &'r Plan,
+    pub(super) robot: &'r Robot,
+    pub(super) plan: &'r Plan,
 }
 
-/// No strain moves further in one Newton step \[rad\].
-const STEP: f64 = 0.5;
-/// Newton steps per load step.
+/// Newton steps per load step, where tensions are given.
 const PATIENCE: usize = 20;
 /// Load steps are not made shorter.
 const SHORTEST: f64 = 1e-4;
+/// A subsegment that went further by itself in one load step has jumped \[rad\].
+const JUMP: f64 = 1.0;
 
 impl<'r> Rod<'r> {
     /// Solves with a plan that was made of this robot.
@@ -53,6 +57,10 @@ impl<'r> Rod<'r> {
         tensions: &[f64],
         work: &mut Workspace,
     ) -> Result<Report, InvalidInput> {
+        if self.plan.settings.tendons == TendonRule::Proportional {
+            let expected = "sliding tendons where tensions are given";
+            return Err(InvalidInput::new("tendons", expected, "\"proportional\""));
+        }
         if tensions.len() != self.plan.rest_lengths.len() {
             let expected = format!("{} values, one per tendon", self.plan.rest_lengths.len());
             return Err(InvalidInput::new("tensions", expected, tensions.len()));
@@ -62,36 +70,60 @@ impl<'r> Rod<'r> {
             return Err(InvalidInput::new("tensions", expected, format!("{bad:?}")));
         }
         let mut budget = self.plan.settings.max_iterations;
-        work.chain.rest(self.plan);
+        let chain = &mut work.chain;
+        chain.rest(self.plan);
         // All free: the lengths are what the tensions make them.
-        work.bounds.clear();
-        work.bounds.resize(tensions.len(), f64::INFINITY);
-        work.reached.0.clone_from(&work.chain.strains);
+        chain.bounds.clear();
+        chain.bounds.resize(tensions.len(), f64::INFINITY);
+        chain.taut.clear();
+        chain.taut.extend(tensions.iter().map(|tension| *tension > 0.0));
+        work.reached.clone_from(&chain.strains);
         let (mut load, mut stride) = (0.0, 1.0_f64);
-        let mut status = Status::Converged;
+        work.ending = Ending::Converged;
         while load < 1.0 {
             let next = (load + stride).min(1.0);
             for (own, wanted) in work.chain.tensions.iter_mut().zip(tensions) {
                 *own = next * wanted / self.plan.unit;
             }
-            if self.newton(work, &mut budget) {
+            if self.settle(work, &mut budget) {
                 load = next;
                 stride *= 2.0;
-                work.reached.0.clone_from(&work.chain.strains);
+                work.reached.clone_from(&work.chain.strains);
             } else {
-                work.chain.strains.clone_from(&work.reached.0);
+                work.chain.strains.clone_from(&work.reached);
                 stride = 0.5 * (next - load);
                 if budget == 0 || stride < SHORTEST {
-                    status = if budget == 0 { Status::IterationLimit } else { Status::Infeasible };
-                    work.left = work.chain.assemble(self.plan, &work.bounds);
+                    work.ending = if budget == 0 { Ending::Spent } else { Ending::Lost };
+                    work.left = work.chain.assemble(self.plan, EASY);
                     break;
                 }
             }
         }
-        work.load = load;
-        self.report(work);
-        let iterations = self.plan.settings.max_iterations - budget;
-        Ok(Report { status, residual: work.left.worst(), iterations })
+        Ok(self.report(work, self.plan.settings.max_iterations - budget))
+    }
+
+    /// Newton's method under given tensions from the point at hand; whether it converged to a minimum.
+    fn settle(&self, work: &mut Workspace, budget: &mut usize) -> bool {
+        let mut moved = 0.0;
+        for _ in 0..PATIENCE {
+            work.left = work.chain.assemble(self.plan, EASY);
+            *budget = budget.saturating_sub(work.left.rounds);
+            moved += work.left.moved;
+            if work.left.worst() <= self.plan.settings.tolerance {
+                return work.left.stable;
+            }
+            if *budget == 0
+                || moved > JUMP
+                || !work.left.worst().is_finite()
+                || !work.chain.solve(self.plan, 0.0)
+            {
+                return false;
+            }
+            for (strain, step) in work.chain.strains.iter_mut().zip(&work.chain.step) {
+                *strain += step;
+            }
+        }
+        false
     }
 
     /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
@@ -110,12 +142,17 @@ impl<'r> Rod<'r> {
             let expected = format!("{elements} strains, one per element");
             return Err(InvalidInput::new("start", expected, start.strains.len()));
         }
+        let width = self.plan.unknowns();
         work.chain.rest(self.plan);
-        for (own, strain) in work.chain.strains.chunks_exact_mut(3).zip(&start.strains) {
-            own.copy_from_slice(strain.as_slice());
+        let places = work.chain.strains.chunks_exact_mut(width);
+        for (e, (own, strain)) in places.zip(&start.strains).enumerate() {
+            own[..3].copy_from_slice(strain.as_slice());
+            if let (4, Some(elongation)) = (width, start.elongations.get(e)) {
+                own[3] = *elongation;
+            }
         }
         for (own, tension) in work.chain.tensions.iter_mut().zip(&start.tensions) {
-            *own = if tension.is_finite() { tension / self.plan.unit } else { 0.0 };
+            *own = if tension.is_finite() { tension.max(0.0) / self.plan.unit } else { 0.0 };
         }
         self.resume(displacements, work)
     }
@@ -129,96 +166,76 @@ impl<'r> Rod<'r> {
         displacements: &[f64],
         work: &mut Workspace,
     ) -> Result<Report, InvalidInput> {
-        let mut budget = self.plan.settings.max_iterations;
-        work.bounds.clear();
-        let rest = self.plan.rest_lengths.iter();
-        work.bounds.extend(rest.zip(displacements).map(|(length, d)| length + d));
-        if work.chain.tensions.len() != displacements.len() || !self.newton(work, &mut budget) {
+        if work.chain.tensions.len() != displacements.len() {
             return self.solve(displacements, work);
         }
-        work.load = 1.0;
-        self.report(work);
-        let iterations = self.plan.settings.max_iterations - budget;
-        Ok(Report { status: Status::Converged, residual: work.left.worst(), iterations })
+        let rounds = self.ascend(displacements, work);
+        if work.ending == Ending::Converged {
+            return Ok(self.report(work, rounds));
+        }
+        self.solve(displacements, work)
     }
 
-    /// Newton's method from the point at hand; whether it converged to a minimum.
-    fn newton(&self, work: &mut Workspace, budget: &mut usize) -> bool {
-        let mut before = f64::INFINITY;
-        for round in 0..PATIENCE {
-            work.left = work.chain.assemble(self.plan, &work.bounds);
-            let worst = work.left.worst();
-            if worst <= self.plan.settings.tolerance {
-                return work.left.stable;
-            }
-            if *budget == 0 || !worst.is_finite() || (round > 8 && worst > 0.5 * before) {
-                return false;
-            }
-            before = worst;
-            *budget -= 1;
-            if !work.chain.solve(self.plan, &work.bounds) {
-                return false;
-            }
-            let longest = work.chain.longest();
-            work.chain.take(if longest > STEP { STEP / longest } else { 1.0 });
+    /// From the strains and tensions at hand to the displacements; evaluations that took.
+    fn ascend(&self, displacements: &[f64], work: &mut Workspace) -> usize {
+        let plan = self.plan;
+        self.bound(displacements, work);
+        if plan.settings.tendons == TendonRule::Proportional {
+            return self.solve_pieces(displacements, work);
         }
-        false
+        let mut budget = plan.settings.max_iterations;
+        (work.ending, work.left) = work.ascent.climb(plan, &mut work.chain, &mut budget);
+        plan.settings.max_iterations - budget
     }
 
-    /// Goes from rest to the whole displacements, in one go if that works.
-    fn climb(&self, displacements: &[f64], work: &mut Workspace) -> (Status, usize) {
-        let mut budget = self.plan.settings.max_iterations;
-        work.chain.rest(self.plan);
-        work.load = 0.0;
-        let mut stride = 1.0_f64;
-        work.reached.0.clone_from(&work.chain.strains);
-        work.reached.1.clone_from(&work.chain.tensions);
-        while work.load < 1.0 {
-            let load = (work.load + stride).min(1.0);
-            work.bounds.clear();
-            let rest = self.plan.rest_lengths.iter();
-            work.bounds.extend(rest.zip(displacements).map(|(length, d)| length + load * d));
-            if self.newton(work, &mut budget) {
-                work.load = load;
-                stride = (2.0 * stride).min(1.0);
-                work.reached.0.clone_from(&work.chain.strains);
-                work.reached.1.clone_from(&work.chain.tensions);
-            } else {
-                work.chain.strains.clone_from(&work.reached.0);
-                work.chain.tensions.clone_from(&work.reached.1);
-                stride = 0.5 * (load - work.load);
-                if budget == 0 {
-                    return (Status::IterationLimit, self.plan.settings.max_iterations);
-                }
-                if stride < SHORTEST {
-                    work.left = work.chain.assemble(self.plan, &work.bounds);
-                    return (Status::Infeasible, self.plan.settings.max_iterations - budget);
-                }
+    fn bound(&self, displacements: &[f64], work: &mut Workspace) {
+        let chain = &mut work.chain;
+        chain.bounds.clear();
+        let rest = self.plan.rest_lengths.iter();
+        chain.bounds.extend(rest.zip(displacements).map(|(length, d)| length + d));
+        chain.taut.clear();
+        chain.taut.extend(displacements.iter().map(|d| d.is_finite()));
+        for (tension, d) in chain.tensions.iter_mut().zip(displacements) {
+            if !d.is_finite() {
+                *tension = 0.0;
             }
         }
-        (Status::Converged, self.plan.settings.max_iterations - budget)
     }
 
     /// Disk frames and everything else that is reported.
-    fn report(&self, work: &mut Workspace) {
+    fn report(&self, work: &mut Workspace, iterations: usize) -> Report {
         let Workspace { state, chain, .. } = work;
         let plan = self.plan;
         state.clear();
         let mut frame = *self.robot.base();
         state.frames.push(frame);
-        for (data, strains) in plan.data.iter().zip(chain.strains.chunks_exact(plan.width())) {
-            chain.local.place(plan.settings.subsegment, data, strains);
-            frame = frame.compose(chain.local.end());
+        state.tendon_lengths.resize(plan.rest_lengths.len(), 0.0);
+        let width = plan.unknowns();
+        let rows = chain.strains.chunks_exact(plan.width());
+        for (i, ((data, strains), end)) in plan.data.iter().zip(rows).zip(&chain.ends).enumerate() {
+            frame = frame.compose(end);
             state.frames.push(frame);
-            for strain in strains.chunks_exact(3) {
-                let strain = Vector3::from_column_slice(strain);
-                state.strains.push(strain);
-                let off = strain - data.rest;
-                state.energy += 0.5 * off.component_mul(&off).dot(&data.stiffness) * plan.unit;
+            for strain in strains.chunks_exact(width) {
+                state.strains.push(Vector3::new(strain[0], strain[1], strain[2]));
+                state.elongations.extend(strain.get(3));
+                for (c, strain) in strain.iter().enumerate() {
+                    let off = strain - data.rest[c];
+                    state.energy += 0.5 * data.stiffness[c] * off * off * plan.unit;
+                }
+            }
+            for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
+                let length = (end.transform(&piece.to) - piece.from).norm();
+                state.tendon_lengths[piece.tendon] += length;
             }
         }
-        state.tendon_lengths.extend_from_slice(&chain.lengths);
         state.tensions.extend(chain.tensions.iter().map(|t| t * plan.unit));
+        let status = match work.ending {
+            Ending::Converged => Status::Converged,
+            Ending::Lost => Status::Infeasible,
+            Ending::Spent => Status::IterationLimit,
+            Ending::Broken => Status::NumericalError,
+        };
+        Report { status, residual: work.left.worst(), iterations }
     }
 }
 
@@ -229,10 +246,14 @@ impl Model for Rod<'_> {
         self.robot
     }
 
+    fn strain_width(&self) -> usize {
+        self.plan.unknowns()
+    }
+
     fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
-        let (status, iterations) = self.climb(displacements, work);
-        self.report(work);
-        Ok(Report { status, residual: work.left.worst(), iterations })
+        work.chain.rest(self.plan);
+        let rounds = self.ascend(displacements, work);
+        Ok(self.report(work, rounds))
     }
 
     fn state<'w>(&self, work: &'w Workspace) -> &'w State {
@@ -243,16 +264,7 @@ impl Model for Rod<'_> {
         work.state
     }
 
-    fn message(&self, _: &[f64], work: &Workspace) -> String {
-        if work.load >= 1.0 {
-            return String::new();
-        }
-        let off = work.chain.lengths.iter().zip(&work.bounds).map(|(length, bound)| length - bound);
-        let worst = off.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(k, _)| k);
-        let name = &self.robot.tendon_names()[worst];
-        format!(
-            "followed to {:.1} % of the displacements; then '{name}' finds no shape",
-            1e2 * work.load
-        )
+    fn message(&self, displacements: &[f64], work: &Workspace) -> String {
+        message(self, displacements, work)
     }
 }

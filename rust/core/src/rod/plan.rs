@@ -1,11 +1,9 @@
 //! What the rod model knows of a robot before any displacement, laid out for the loop.
 
-use nalgebra::Vector3;
-
-use super::settings::RodSettings;
+use super::settings::{RodSettings, TendonRule};
 use super::subsegment::{Data, Local, Piece};
 use crate::error::InvalidInput;
-use crate::robot::Robot;
+use crate::robot::{Robot, Tendon};
 
 /// A robot prepared for the rod model.
 #[derive(Clone, Debug)]
@@ -18,6 +16,14 @@ pub struct Plan {
     pub(super) starts: Vec<usize>,
     /// Length of every tendon at rest through these elements \[m\].
     pub(super) rest_lengths: Vec<f64>,
+    /// What a tendon becomes longer by under one unit of tension \[m\]: 0 for a rigid one.
+    pub(super) compliance: Vec<f64>,
+    /// Largest length² over bending stiffness: a tension times this is a load of order 1 for a subsegment.
+    pub(super) slenderness: f64,
+    /// Multipliers may push, and lengths are equations.
+    pub(super) signed: bool,
+    /// One plan per subsegment, whose tendons are its pieces, where displacements are proportional.
+    pub(super) parts: Vec<Plan>,
     /// Tension \[N, or 1/m²·EI\] of one unit here.
     pub(super) unit: f64,
 }
@@ -51,11 +57,15 @@ impl Plan {
         let mut data = Vec::with_capacity(n);
         let mut pieces = Vec::new();
         let mut starts = Vec::with_capacity(n + 1);
+        let mut slenderness = 0.0_f64;
         for i in 0..n {
             let length = backbone.lengths()[i] / elements;
             let bending = backbone.bending_stiffness(i) / (length * unit);
-            let stiffness = Vector3::new(bending, bending, bending / (1.0 + poisson));
-            data.push(Data { length, stiffness, rest: backbone.rest(i) / elements });
+            let axial = backbone.axial_stiffness(i).map_or(0.0, |ea| ea * length / unit);
+            let stiffness = [bending, bending, bending / (1.0 + poisson), axial];
+            let rest = backbone.rest(i) / elements;
+            data.push(Data { length, stiffness, rest: [rest.x, rest.y, rest.z, 0.0] });
+            slenderness = slenderness.max(elements * elements * length / bending);
             starts.push(pieces.len());
             for (tendon, path) in robot.paths().iter().enumerate() {
                 if path.end() > i {
@@ -64,27 +74,79 @@ impl Plan {
             }
         }
         starts.push(pieces.len());
-        let mut plan = Self { settings, data, pieces, starts, rest_lengths: Vec::new(), unit };
-        plan.rest_lengths = plan.lengths_at_rest(robot.paths().len());
+        let count = robot.tendons().len();
+        let mut plan = Self {
+            settings,
+            data,
+            pieces,
+            starts,
+            rest_lengths: Vec::new(),
+            compliance: Vec::new(),
+            slenderness,
+            signed: false,
+            parts: Vec::new(),
+            unit,
+        };
+        let lengths = plan.piece_lengths_at_rest();
+        plan.rest_lengths = vec![0.0; count];
+        for (piece, length) in plan.pieces.iter().zip(&lengths) {
+            plan.rest_lengths[piece.tendon] += length;
+        }
+        let give = |(tendon, length): (&Tendon, &f64)| {
+            tendon.stiffness().map_or(0.0, |stiffness| length * unit / stiffness)
+        };
+        plan.compliance = robot.tendons().iter().zip(&plan.rest_lengths).map(give).collect();
+        if settings.tendons == TendonRule::Proportional {
+            plan.parts = (0..n).map(|i| plan.part(i, &lengths)).collect();
+        }
         Ok(plan)
     }
 
-    /// Lengths through these elements: links cut corners that arcs round.
-    fn lengths_at_rest(&self, tendons: usize) -> Vec<f64> {
-        let mut lengths = vec![0.0; tendons];
+    /// Length of every piece at rest through these elements: links cut corners that arcs round.
+    fn piece_lengths_at_rest(&self) -> Vec<f64> {
+        let mut lengths = Vec::with_capacity(self.pieces.len());
         let mut local = Local::default();
         for (i, data) in self.data.iter().enumerate() {
-            let rest = data.rest.as_slice().repeat(self.settings.elements);
-            local.place(self.settings.subsegment, data, &rest);
-            for piece in &self.pieces[self.starts[i]..self.starts[i + 1]] {
-                lengths[piece.tendon] += (local.end().transform(&piece.to) - piece.from).norm();
-            }
+            let rest = data.rest[..3].repeat(self.settings.elements);
+            local.place::<3>(self.settings.subsegment, data, &rest);
+            let end = local.end();
+            let pieces = &self.pieces[self.starts[i]..self.starts[i + 1]];
+            lengths.extend(pieces.iter().map(|p| (end.transform(&p.to) - p.from).norm()));
         }
         lengths
     }
 
+    /// One subsegment with its pieces as tendons of their own.
+    fn part(&self, i: usize, lengths: &[f64]) -> Self {
+        let range = self.starts[i]..self.starts[i + 1];
+        let pieces = &self.pieces[range.clone()];
+        let rest_lengths = lengths[range].to_vec();
+        let shares = pieces.iter().zip(&rest_lengths);
+        let compliance =
+            shares.map(|(p, l)| self.compliance[p.tendon] * l / self.rest_lengths[p.tendon]);
+        let data = self.data[i];
+        let length = data.length * self.settings.elements as f64;
+        Self {
+            settings: self.settings,
+            data: vec![data],
+            pieces: pieces.iter().enumerate().map(|(k, p)| Piece { tendon: k, ..*p }).collect(),
+            starts: vec![0, pieces.len()],
+            compliance: compliance.collect(),
+            rest_lengths,
+            slenderness: length * self.settings.elements as f64 / data.stiffness[0],
+            signed: true,
+            parts: Vec::new(),
+            unit: self.unit,
+        }
+    }
+
+    /// Unknowns of an element.
+    pub(super) fn unknowns(&self) -> usize {
+        if self.settings.axial { 4 } else { 3 }
+    }
+
     /// Unknowns of a subsegment.
     pub(super) fn width(&self) -> usize {
-        3 * self.settings.elements
+        self.unknowns() * self.settings.elements
     }
 }

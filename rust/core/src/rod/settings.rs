@@ -75,7 +75,7 @@ impl Default for RodSettings {
             axial: false,
             elements: 1,
             tolerance: 1e-11,
-            max_iterations: 500,
+            max_iterations: 600,
         }
     }
 }

@@ -1,10 +1,14 @@
 //! One subsegment: its energy and the tendons through it, with exact first and second derivatives.
+//!
+//! Functions are compiled for 3 or 4 unknowns per element (rotation vector, and elongation) and once more
+//! for a single element, the usual case, whose loops then unroll.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::element::Element;
 use super::settings::Subsegment;
-use crate::lie::{Pose, so3};
+use crate::lie::Pose;
+use crate::solve::quadratic::{backward, dot, forward};
 
 /// A tendon between two disks: its holes in the frames of the base disk and of the next one.
 #[derive(Clone, Copy, Debug)]
@@ -19,10 +23,10 @@ pub(super) struct Piece {
 pub(super) struct Data {
     /// Rest length of an element \[m\].
     pub(super) length: f64,
-    /// Bending and torsional stiffness of an element over its length.
-    pub(super) stiffness: Vector3<f64>,
-    /// Rest strain of an element \[rad\].
-    pub(super) rest: Vector3<f64>,
+    /// Stiffness of an element by its unknowns: bending, bending, torsion, elongation.
+    pub(super) stiffness: [f64; 4],
+    /// Rest strain of an element \[rad\], and no elongation.
+    pub(super) rest: [f64; 4],
 }
 
 /// Values and derivatives at a point, in slices of the caller's arrays.
@@ -38,131 +42,198 @@ pub(super) struct Derivatives<'a> {
     pub(super) lengths: &'a mut [f64],
 }
 
+/// One element of the subsegment, in the axes of the base disk, and what the tendons do to it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    pub(super) element: Element,
+    pub(super) base: Pose,
+    pub(super) end: Pose,
+    /// Angular velocity of its end, and velocity of its end, by its unknowns.
+    pub(super) spin: [Vector3<f64>; 4],
+    pub(super) sweep: [Vector3<f64>; 4],
+    /// Velocity of the hole that was looked at last, by its unknowns.
+    pub(super) moved: [Vector3<f64>; 4],
+    /// Sums over tendons of force, moment and dyad for its own curvature, in its own axes.
+    force: Vector3<f64>,
+    moment: Vector3<f64>,
+    dyad: Matrix3<f64>,
+    /// Of the couple that turning a nearer element adds.
+    couple: [Vector3<f64>; 4],
+}
+
+const NONE: [Vector3<f64>; 4] = [Vector3::new(0.0, 0.0, 0.0); 4];
+
+impl Node {
+    #[inline(always)]
+    fn at<const D: usize>(kind: Subsegment, length: f64, strain: &[f64], base: Pose) -> Self {
+        let elongation = if D == 4 { strain[3] } else { 0.0 };
+        let turn = Vector3::new(strain[0], strain[1], strain[2]);
+        let element = Element::new(kind, length, turn, elongation);
+        Self {
+            element,
+            base,
+            end: base.compose(&element.end),
+            spin: NONE,
+            sweep: NONE,
+            moved: NONE,
+            force: Vector3::zeros(),
+            moment: Vector3::zeros(),
+            dyad: Matrix3::zeros(),
+            couple: NONE,
+        }
+    }
+
+    #[inline(always)]
+    fn set_velocities<const D: usize>(&mut self, first: bool) {
+        let (spin, sweep) = if first {
+            (self.element.spin, self.element.sweep)
+        } else {
+            (self.base.rotation * self.element.spin, self.base.rotation * self.element.sweep)
+        };
+        for c in 0..3 {
+            self.spin[c] = spin.column(c).into();
+            self.sweep[c] = sweep.column(c).into();
+        }
+        if D == 4 {
+            self.sweep[3] = self.base.rotation * self.element.stretch();
+        }
+    }
+}
+
 /// Buffers of a subsegment.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Local {
-    elements: Vec<Element>,
-    /// Frames of the elements' bases and of the last one's end, in the base disk's.
-    frames: Vec<Pose>,
-    /// Angular velocity of each element's end by its strain, base disk's axes.
-    spins: Vec<Matrix3<f64>>,
-    sweeps: Vec<Matrix3<f64>>,
-    /// Per element: sums over tendons of force, moment and dyad for its own curvature, and of the couple
-    /// that turning a nearer element adds.
-    forces: Vec<Vector3<f64>>,
-    moments: Vec<Vector3<f64>>,
-    dyads: Vec<Matrix3<f64>>,
-    couples: Vec<Matrix3<f64>>,
-    levers: Vec<Matrix3<f64>>,
+    pub(super) nodes: Vec<Node>,
+    step: Vec<f64>,
+    trial: Vec<f64>,
 }
+
+/// No strain moves further in one step \[rad\].
+const STEP: f64 = 0.5;
+/// Halvings of a step, and the share of the predicted decrease that it must deliver.
+const BACKTRACKS: usize = 10;
+const ARMIJO: f64 = 1e-4;
+/// Share of a value that its rounding may be.
+pub(super) const ROUNDING: f64 = 1e-14;
 
 impl Local {
     /// Places the elements.
-    pub(super) fn place(&mut self, kind: Subsegment, data: &Data, strains: &[f64]) {
-        self.elements.clear();
-        self.frames.clear();
-        let mut frame = Pose::identity();
-        self.frames.push(frame);
-        for strain in strains.chunks_exact(3) {
-            let strain = Vector3::from_column_slice(strain);
-            let element = Element::new(kind, data.length, strain);
-            frame = frame.compose(&element.end);
-            self.frames.push(frame);
-            self.elements.push(element);
+    #[inline(always)]
+    pub(super) fn place<const D: usize>(&mut self, kind: Subsegment, data: &Data, strains: &[f64]) {
+        self.nodes.clear();
+        let mut base = Pose::identity();
+        for strain in strains.chunks_exact(D) {
+            let node = Node::at::<D>(kind, data.length, strain, base);
+            base = node.end;
+            self.nodes.push(node);
         }
     }
 
     /// Frame of the next disk.
-    pub(super) fn end(&self) -> &Pose {
-        &self.frames[self.frames.len() - 1]
+    #[inline(always)]
+    pub(super) fn end(&self) -> Pose {
+        self.nodes.last().map_or_else(Pose::identity, |node| node.end)
     }
 
-    /// Derivatives at the strains placed last, for tensions by tendon.
-    pub(super) fn differentiate(
+    /// Derivatives at the strains placed last, for tensions by tendon; pieces of tendons that are not `taut`
+    /// are left out.
+    #[inline(always)]
+    pub(super) fn differentiate<const D: usize, const ONE: bool>(
         &mut self,
         data: &Data,
         pieces: &[Piece],
         strains: &[f64],
         tensions: &[f64],
+        taut: &[bool],
         out: &mut Derivatives<'_>,
     ) {
-        let size = strains.len();
-        self.begin();
-        out.hessian.fill(0.0);
-        for (k, (strain, gradient)) in strains.iter().zip(out.gradient.iter_mut()).enumerate() {
-            *gradient = data.stiffness[k % 3] * (strain - data.rest[k % 3]);
-            out.hessian[k * (size + 1)] = data.stiffness[k % 3];
+        let size = if ONE { D } else { D * self.nodes.len() };
+        for (e, node) in self.nodes.iter_mut().enumerate() {
+            node.set_velocities::<D>(e == 0);
         }
+        out.hessian.fill(0.0);
+        for k in 0..size {
+            let c = k % D;
+            out.gradient[k] = data.stiffness[c] * (strains[k] - data.rest[c]);
+            out.hessian[k * (size + 1)] = data.stiffness[c];
+        }
+        let mut pulled = false;
         for (p, piece) in pieces.iter().enumerate() {
+            if !taut[piece.tendon] {
+                continue;
+            }
             let row = &mut out.rows[p * size..(p + 1) * size];
             let tension = tensions[piece.tendon];
-            out.lengths[p] = self.pull(piece, tension, row, out.hessian);
-            if tension > 0.0 {
+            out.lengths[p] = self.pull::<D, ONE>(piece, tension, row, out.hessian);
+            if tension != 0.0 {
+                pulled = true;
                 for (gradient, a) in out.gradient.iter_mut().zip(row.iter()) {
                     *gradient += tension * a;
                 }
             }
         }
-        self.add_curvature(out.hessian);
-    }
-
-    fn begin(&mut self) {
-        let count = self.elements.len();
-        self.spins.clear();
-        self.sweeps.clear();
-        for (element, frame) in self.elements.iter().zip(&self.frames) {
-            self.spins.push(frame.rotation * element.spin);
-            self.sweeps.push(frame.rotation * element.sweep);
+        if pulled {
+            self.add_curvature::<D, ONE>(out.hessian);
         }
-        self.forces.clear();
-        self.forces.resize(count, Vector3::zeros());
-        self.moments.clear();
-        self.moments.resize(count, Vector3::zeros());
-        self.dyads.clear();
-        self.dyads.resize(count, Matrix3::zeros());
-        self.couples.clear();
-        self.couples.resize(count, Matrix3::zeros());
     }
 
     /// One tendon: the derivatives of its length into `row`, what its direction adds to the Hessian, and the
     /// sums for the curvature of the path of its hole. Returns its length.
-    fn pull(&mut self, piece: &Piece, tension: f64, row: &mut [f64], hessian: &mut [f64]) -> f64 {
-        let size = row.len();
+    #[inline(always)]
+    fn pull<const D: usize, const ONE: bool>(
+        &mut self,
+        piece: &Piece,
+        tension: f64,
+        row: &mut [f64],
+        hessian: &mut [f64],
+    ) -> f64 {
+        let count = if ONE { 1 } else { self.nodes.len() };
+        let size = D * count;
         let point = self.end().transform(&piece.to);
         let line = point - piece.from;
         let length = line.norm();
         let u = line / length;
-        self.levers.clear();
-        for e in 0..self.elements.len() {
-            let lever = point - self.frames[e + 1].translation;
-            let moved = self.sweeps[e] - so3::hat(&lever) * self.spins[e];
-            row[3 * e..3 * e + 3].copy_from_slice((moved.transpose() * u).as_slice());
-            if tension > 0.0 {
-                let pull = self.frames[e].rotation.transpose() * (u * tension);
-                let x = self.frames[e + 1].rotation.transpose() * lever;
-                self.forces[e] += pull;
-                self.moments[e] += x.cross(&pull);
-                self.dyads[e] += pull * x.transpose();
+        let force = u * tension;
+        let weight = tension / length;
+        for e in 0..count {
+            let node = &mut self.nodes[e];
+            let lever = point - node.end.translation;
+            let turned = lever.cross(&u);
+            for c in 0..3 {
+                row[D * e + c] = node.sweep[c].dot(&u) + node.spin[c].dot(&turned);
+            }
+            if D == 4 {
+                row[D * e + 3] = node.sweep[3].dot(&u);
+            }
+            if tension != 0.0 {
+                let own = if e == 0 { force } else { node.base.rotation.tr_mul(&force) };
+                let x = if ONE { piece.to } else { node.end.rotation.tr_mul(&lever) };
+                node.force += own;
+                node.moment += x.cross(&own);
+                node.dyad += own * x.transpose();
+                for c in 0..3 {
+                    node.moved[c] = node.sweep[c] + node.spin[c].cross(&lever);
+                }
+                if D == 4 {
+                    node.moved[3] = node.sweep[3];
+                }
                 if e > 0 {
-                    for a in 0..3 {
-                        let couple = moved.column(a).cross(&u) * tension;
-                        let mut place = self.couples[e].column_mut(a);
-                        place += couple;
+                    for c in 0..D {
+                        node.couple[c] += node.moved[c].cross(&force);
                     }
                 }
-                self.levers.push(moved);
             }
         }
-        if tension > 0.0 {
-            let weight = tension / length;
-            for (e, moved) in self.levers.iter().enumerate() {
-                for (f, other) in self.levers[..=e].iter().enumerate() {
-                    let block = moved.tr_mul(other);
-                    for a in 0..3 {
-                        let (i, along) = (3 * e + a, row[3 * e + a]);
-                        for b in 0..3 {
-                            let j = 3 * f + b;
-                            hessian[i * size + j] += weight * (block[(a, b)] - along * row[j]);
+        if tension != 0.0 {
+            for e in 0..count {
+                for f in 0..=e {
+                    for a in 0..D {
+                        let (i, along) = (D * e + a, row[D * e + a]);
+                        let most = if e == f { a + 1 } else { D };
+                        for b in 0..most {
+                            let j = D * f + b;
+                            let product = self.nodes[e].moved[a].dot(&self.nodes[f].moved[b]);
+                            hessian[i * size + j] += weight * (product - along * row[j]);
                         }
                     }
                 }
@@ -171,24 +242,92 @@ impl Local {
         length
     }
 
-    fn add_curvature(&self, hessian: &mut [f64]) {
-        let size = 3 * self.elements.len();
-        for (e, element) in self.elements.iter().enumerate() {
-            let block = element.curvature(&self.forces[e], &self.moments[e], &self.dyads[e]);
+    #[inline(always)]
+    fn add_curvature<const D: usize, const ONE: bool>(&self, hessian: &mut [f64]) {
+        let count = if ONE { 1 } else { self.nodes.len() };
+        let size = D * count;
+        for e in 0..count {
+            let node = &self.nodes[e];
+            let block = node.element.curvature(&node.force, &node.moment, &node.dyad);
             for a in 0..3 {
-                for b in 0..3 {
-                    hessian[(3 * e + a) * size + 3 * e + b] += block[(a, b)];
+                for b in 0..=a {
+                    hessian[(D * e + a) * size + D * e + b] += block[(a, b)];
                 }
             }
-            for (f, spin) in self.spins[..e].iter().enumerate() {
+            if D == 4 {
+                let mixed = node.element.stretch_slope(&node.force);
+                for b in 0..3 {
+                    hessian[(D * e + 3) * size + D * e + b] += mixed[b];
+                }
+            }
+            for f in 0..e {
                 // A nearer element turns all that this one moves.
-                let block = self.couples[e].tr_mul(spin);
-                for a in 0..3 {
+                for a in 0..D {
                     for b in 0..3 {
-                        hessian[(3 * e + a) * size + 3 * f + b] += block[(a, b)];
+                        hessian[(D * e + a) * size + D * f + b] +=
+                            node.couple[a].dot(&self.nodes[f].spin[b]);
                     }
                 }
             }
         }
+    }
+
+    /// The energy and the tensions' work at the strains placed last.
+    pub(super) fn value<const D: usize>(
+        &self,
+        data: &Data,
+        pieces: &[Piece],
+        strains: &[f64],
+        tensions: &[f64],
+    ) -> f64 {
+        let energy = strains
+            .iter()
+            .enumerate()
+            .map(|(k, strain)| 0.5 * data.stiffness[k % D] * (strain - data.rest[k % D]).powi(2));
+        let end = self.end();
+        let work = pieces
+            .iter()
+            .filter(|piece| tensions[piece.tendon] != 0.0)
+            .map(|p| tensions[p.tendon] * (end.transform(&p.to) - p.from).norm());
+        energy.sum::<f64>() + work.sum::<f64>()
+    }
+
+    /// Moves by a share of the Newton step of factored derivatives that lowers the value, and returns how
+    /// far; nothing when none does.
+    pub(super) fn relax<const D: usize>(
+        &mut self,
+        kind: Subsegment,
+        data: &Data,
+        pieces: &[Piece],
+        strains: &mut [f64],
+        tensions: &[f64],
+        at: &Derivatives<'_>,
+    ) -> Option<f64> {
+        let size = strains.len();
+        let (mut step, mut trial) =
+            (std::mem::take(&mut self.step), std::mem::take(&mut self.trial));
+        step.clear();
+        step.extend(at.gradient.iter().map(|g| -g));
+        forward(at.hessian, size, &mut step);
+        backward(at.hessian, size, &mut step);
+        let before = self.value::<D>(data, pieces, strains, tensions);
+        let slope = dot(at.gradient, &step);
+        let longest = step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+        let mut share = if longest > STEP { STEP / longest } else { 1.0 };
+        let mut went = None;
+        for _ in 0..BACKTRACKS {
+            trial.clear();
+            trial.extend(strains.iter().zip(&step).map(|(strain, s)| strain + share * s));
+            self.place::<D>(kind, data, &trial);
+            let after = self.value::<D>(data, pieces, &trial, tensions);
+            if after <= before + ARMIJO * share * slope + ROUNDING * before {
+                strains.copy_from_slice(&trial);
+                went = Some(share * longest);
+                break;
+            }
+            share *= 0.5;
+        }
+        (self.step, self.trial) = (step, trial);
+        went
     }
 }

@@ -1,0 +1,52 @@
+//! What stood in the way of a solve, in a sentence.
+
+use super::ascent::Ending;
+use super::model::{Rod, Workspace};
+use super::settings::TendonRule;
+
+/// The message for displacements (or none, where tensions were given); empty when the solve converged.
+pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Workspace) -> String {
+    let (plan, state) = (rod.plan, &work.state);
+    if work.ending == Ending::Converged {
+        return String::new();
+    }
+    if displacements.is_empty() {
+        return "the rest shape under growing tensions ends before these are reached".to_owned();
+    }
+    let over = |k: usize| {
+        let stretch = plan.compliance[k] * state.tensions[k] / plan.unit;
+        state.tendon_lengths[k] - stretch - plan.rest_lengths[k] - displacements[k]
+    };
+    // A sliding tendon may be slack.
+    let off = |k: usize| match plan.settings.tendons {
+        TendonRule::Sliding => over(k).max(0.0),
+        TendonRule::Proportional => over(k).abs(),
+    };
+    let worst = (0..displacements.len())
+        .filter(|k| displacements[*k].is_finite())
+        .max_by(|a, b| off(*a).total_cmp(&off(*b)))
+        .unwrap_or(0);
+    let opening = match work.ending {
+        Ending::Spent => "out of evaluations on the way to the displacements",
+        Ending::Broken => "the arithmetic broke down",
+        _ => "no shape near rest has these tendon lengths",
+    };
+    let name = |k: usize| format!("'{}'", rod.robot.tendon_names()[k]);
+    let side = if over(worst) > 0.0 { "long" } else { "short" };
+    let mut text = format!("{opening}: {} stays {:.3e} m too {side}", name(worst), off(worst));
+    let held: Vec<String> = (0..displacements.len())
+        .filter(|k| displacements[*k] == 0.0 && state.tensions[*k] != 0.0)
+        .map(name)
+        .collect();
+    if !held.is_empty() {
+        text += "; held at their rest length: ";
+        text += &held.join(", ");
+        text += "; free them (inf), release them";
+    }
+    let several = displacements.iter().filter(|d| d.is_finite()).count() > 1;
+    if several && plan.compliance.iter().all(|give| *give == 0.0) {
+        text += if held.is_empty() { "; " } else { ", or " };
+        text += "give the tendons a stiffness if they are elastic";
+    }
+    text
+}
