@@ -29,6 +29,7 @@ mod pso;
 mod pso_rates;
 mod robot;
 mod rod_golden;
+mod rod_sensitivity;
 mod solve;
 mod solve_quadratic;
 

@@ -7,9 +7,11 @@ mod message;
 mod model;
 mod plan;
 mod proportional;
+mod sensitivity;
 mod settings;
 mod subsegment;
 
 pub use model::{Rod, Workspace};
 pub use plan::Plan;
+pub use sensitivity::{Change, Sensitivity, Variation};
 pub use settings::{RodSettings, Subsegment, TendonRule};

@@ -19,6 +19,9 @@ pub struct Workspace {
     pub(super) chain: Chain,
     /// One subsegment, where displacements are proportional.
     pub(super) part: Chain,
+    /// Tension of every piece, and the tendons that drive.
+    pub(super) pulls: Vec<f64>,
+    pub(super) drives: Vec<bool>,
     pub(super) ascent: Ascent,
     pub(super) left: Left,
     pub(super) ending: Ending,

@@ -16,6 +16,8 @@ pub struct Plan {
     pub(super) starts: Vec<usize>,
     /// Length of every tendon at rest through these elements \[m\].
     pub(super) rest_lengths: Vec<f64>,
+    /// The same of every piece.
+    pub(super) piece_lengths: Vec<f64>,
     /// What a tendon becomes longer by under one unit of tension \[m\]: 0 for a rigid one.
     pub(super) compliance: Vec<f64>,
     /// Largest length² over bending stiffness: a tension times this is a load of order 1 for a subsegment.
@@ -81,15 +83,16 @@ impl Plan {
             pieces,
             starts,
             rest_lengths: Vec::new(),
+            piece_lengths: Vec::new(),
             compliance: Vec::new(),
             slenderness,
             signed: false,
             parts: Vec::new(),
             unit,
         };
-        let lengths = plan.piece_lengths_at_rest();
+        plan.piece_lengths = plan.lengths_at_rest();
         plan.rest_lengths = vec![0.0; count];
-        for (piece, length) in plan.pieces.iter().zip(&lengths) {
+        for (piece, length) in plan.pieces.iter().zip(&plan.piece_lengths) {
             plan.rest_lengths[piece.tendon] += length;
         }
         let give = |(tendon, length): (&Tendon, &f64)| {
@@ -97,13 +100,13 @@ impl Plan {
         };
         plan.compliance = robot.tendons().iter().zip(&plan.rest_lengths).map(give).collect();
         if settings.tendons == TendonRule::Proportional {
-            plan.parts = (0..n).map(|i| plan.part(i, &lengths)).collect();
+            plan.parts = (0..n).map(|i| plan.part(i)).collect();
         }
         Ok(plan)
     }
 
     /// Length of every piece at rest through these elements: links cut corners that arcs round.
-    fn piece_lengths_at_rest(&self) -> Vec<f64> {
+    fn lengths_at_rest(&self) -> Vec<f64> {
         let mut lengths = Vec::with_capacity(self.pieces.len());
         let mut local = Local::default();
         for (i, data) in self.data.iter().enumerate() {
@@ -117,10 +120,10 @@ impl Plan {
     }
 
     /// One subsegment with its pieces as tendons of their own.
-    fn part(&self, i: usize, lengths: &[f64]) -> Self {
+    fn part(&self, i: usize) -> Self {
         let range = self.starts[i]..self.starts[i + 1];
         let pieces = &self.pieces[range.clone()];
-        let rest_lengths = lengths[range].to_vec();
+        let rest_lengths = self.piece_lengths[range].to_vec();
         let shares = pieces.iter().zip(&rest_lengths);
         let compliance =
             shares.map(|(p, l)| self.compliance[p.tendon] * l / self.rest_lengths[p.tendon]);
@@ -132,12 +135,18 @@ impl Plan {
             pieces: pieces.iter().enumerate().map(|(k, p)| Piece { tendon: k, ..*p }).collect(),
             starts: vec![0, pieces.len()],
             compliance: compliance.collect(),
+            piece_lengths: rest_lengths.clone(),
             rest_lengths,
             slenderness: length * self.settings.elements as f64 / data.stiffness[0],
             signed: true,
             parts: Vec::new(),
             unit: self.unit,
         }
+    }
+
+    /// Rest length of a subsegment \[m\].
+    pub(super) fn length(&self, i: usize) -> f64 {
+        self.data[i].length * self.settings.elements as f64
     }
 
     /// Unknowns of an element.

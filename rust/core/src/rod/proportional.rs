@@ -4,8 +4,9 @@
 //! as tendons whose lengths are equations and whose multipliers may have any sign.
 
 use super::ascent::Ending;
-use super::chain::Left;
+use super::chain::{Chain, Left};
 use super::model::{Rod, Workspace};
+use super::plan::Plan;
 
 /// A held tendon stretches when it becomes longer by more than this share of itself.
 const STRETCHED: f64 = 1e-10;
@@ -40,47 +41,64 @@ impl Rod<'_> {
 
     fn solve_driven(&self, displacements: &[f64], drives: &[bool], work: &mut Workspace) -> usize {
         let (plan, width) = (self.plan, self.plan.width());
-        let Workspace { chain, part, ascent, state, .. } = work;
-        chain.ends.clear();
-        state.tendon_lengths.clear();
-        state.tendon_lengths.resize(drives.len(), 0.0);
-        let start = chain.tensions.clone();
-        chain.tensions.fill(0.0);
+        // The base piece's tension is the first guess of all.
+        let tensions = work.chain.tensions.iter().zip(drives);
+        let tensions: Vec<f64> =
+            tensions.map(|(t, drives)| if *drives { *t } else { 0.0 }).collect();
+        work.pulls.clear();
+        work.pulls.extend(plan.pieces.iter().map(|piece| tensions[piece.tendon]));
+        work.drives.clear();
+        work.drives.extend_from_slice(drives);
+        work.state.tendon_lengths.clear();
+        work.state.tendon_lengths.resize(drives.len(), 0.0);
+        work.chain.ends.clear();
         (work.ending, work.left) = (Ending::Converged, Left { stable: true, ..Left::default() });
+        let mut part = std::mem::take(&mut work.part);
         let mut most = 0;
         for (i, own) in plan.parts.iter().enumerate() {
-            let pieces = &plan.pieces[plan.starts[i]..plan.starts[i + 1]];
-            part.strains.clear();
-            part.strains.extend_from_slice(&chain.strains[i * width..(i + 1) * width]);
-            part.tensions.clear();
-            part.bounds.clear();
-            part.taut.clear();
-            for (piece, rest) in pieces.iter().zip(&own.rest_lengths) {
-                let k = piece.tendon;
-                let ratio = 1.0 + displacements[k] / plan.rest_lengths[k];
-                part.tensions.push(if drives[k] { start[k] } else { 0.0 });
-                part.bounds.push(if drives[k] { ratio * rest } else { f64::INFINITY });
-                part.taut.push(drives[k]);
-            }
+            work.load_part(plan, i, displacements, &mut part);
             let mut budget = plan.settings.max_iterations;
-            let (ending, left) = ascent.climb(own, part, &mut budget);
+            let (ending, left) = work.ascent.climb(own, &mut part, &mut budget);
             most = most.max(plan.settings.max_iterations - budget);
             if work.ending == Ending::Converged {
                 work.ending = ending;
             }
             work.left.moment = work.left.moment.max(left.moment);
             work.left.length = work.left.length.max(left.length);
-            chain.strains[i * width..(i + 1) * width].copy_from_slice(&part.strains);
-            for (j, piece) in pieces.iter().enumerate() {
-                let end = &part.ends[0];
+            work.chain.strains[i * width..(i + 1) * width].copy_from_slice(&part.strains);
+            let range = plan.starts[i]..plan.starts[i + 1];
+            work.pulls[range.clone()].copy_from_slice(&part.tensions);
+            let end = part.ends[0];
+            for piece in &plan.pieces[range] {
                 let length = (end.transform(&piece.to) - piece.from).norm();
-                state.tendon_lengths[piece.tendon] += length;
-                if i == 0 {
-                    chain.tensions[piece.tendon] = part.tensions[j];
-                }
+                work.state.tendon_lengths[piece.tendon] += length;
             }
-            chain.ends.push(part.ends[0]);
+            work.chain.ends.push(end);
+        }
+        work.part = part;
+        work.chain.tensions.fill(0.0);
+        for (piece, pull) in plan.pieces[..plan.starts[1]].iter().zip(&work.pulls) {
+            work.chain.tensions[piece.tendon] = *pull;
         }
         most
+    }
+}
+
+impl Workspace {
+    /// Puts a subsegment as it is, with its share of the displacements, into a chain of its own.
+    pub(super) fn load_part(&self, plan: &Plan, i: usize, displacements: &[f64], part: &mut Chain) {
+        let (width, range) = (plan.width(), plan.starts[i]..plan.starts[i + 1]);
+        part.strains.clear();
+        part.strains.extend_from_slice(&self.chain.strains[i * width..(i + 1) * width]);
+        part.tensions.clear();
+        part.tensions.extend_from_slice(&self.pulls[range.clone()]);
+        part.bounds.clear();
+        part.taut.clear();
+        for (piece, rest) in plan.pieces[range.clone()].iter().zip(&plan.piece_lengths[range]) {
+            let k = piece.tendon;
+            let ratio = 1.0 + displacements[k] / plan.rest_lengths[k];
+            part.bounds.push(if self.drives[k] { ratio * rest } else { f64::INFINITY });
+            part.taut.push(self.drives[k]);
+        }
     }
 }

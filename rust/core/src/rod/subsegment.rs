@@ -83,6 +83,13 @@ impl Node {
         }
     }
 
+    /// Velocity of a point beyond it (base disk's axes), and angular velocity, by one of its unknowns.
+    #[inline(always)]
+    pub(super) fn velocity(&self, c: usize, point: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        let lever = point - self.end.translation;
+        (self.sweep[c] + self.spin[c].cross(&lever), self.spin[c])
+    }
+
     #[inline(always)]
     fn set_velocities<const D: usize>(&mut self, first: bool) {
         let (spin, sweep) = if first {
@@ -126,6 +133,19 @@ impl Local {
             let node = Node::at::<D>(kind, data.length, strain, base);
             base = node.end;
             self.nodes.push(node);
+        }
+    }
+
+    /// Places the elements and their velocities.
+    pub(super) fn prepare<const D: usize>(
+        &mut self,
+        kind: Subsegment,
+        data: &Data,
+        strains: &[f64],
+    ) {
+        self.place::<D>(kind, data, strains);
+        for (e, node) in self.nodes.iter_mut().enumerate() {
+            node.set_velocities::<D>(e == 0);
         }
     }
 

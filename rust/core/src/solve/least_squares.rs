@@ -12,6 +12,8 @@ pub struct PseudoInverse {
     pub matrix: DMatrix<f64>,
     /// Largest over smallest singular value that counts; 1 for an empty matrix.
     pub condition: f64,
+    /// Number of singular values that count.
+    pub rank: usize,
 }
 
 impl PseudoInverse {
@@ -21,15 +23,17 @@ impl PseudoInverse {
         let (rows, columns) = matrix.shape();
         let mut inverse = DMatrix::zeros(columns, rows);
         if rows == 0 || columns == 0 {
-            return Self { matrix: inverse, condition: 1.0 };
+            return Self { matrix: inverse, condition: 1.0, rank: 0 };
         }
         let decomposition = matrix.clone().svd(true, true);
         let values = &decomposition.singular_values;
         let largest = values.max();
         let mut smallest = largest;
+        let mut rank = 0;
         if let (Some(u), Some(v)) = (&decomposition.u, &decomposition.v_t) {
             for (k, &value) in values.iter().enumerate() {
                 if value > DEFICIENT * largest {
+                    rank += 1;
                     smallest = smallest.min(value);
                     inverse += v.row(k).transpose() * u.column(k).transpose() / value;
                 }
@@ -40,7 +44,7 @@ impl PseudoInverse {
         let twice = &inverse * 2.0;
         inverse = twice - &inverse * matrix * &inverse;
         let condition = if largest > 0.0 { largest / smallest } else { 1.0 };
-        Self { matrix: inverse, condition }
+        Self { matrix: inverse, condition, rank }
     }
 
     /// The least-squares answer of minimum norm.
