@@ -120,28 +120,6 @@ impl<'r> Rod<'r> {
         self.resume(displacements, work)
     }
 
-    /// Solves for displacements from what the last solve of this plan left in `work`.
-    ///
-    /// # Errors
-    /// As [`Model::solve`].
-    pub fn resume(
-        &self,
-        displacements: &[f64],
-        work: &mut Workspace,
-    ) -> Result<Report, InvalidInput> {
-        let mut budget = self.plan.settings.max_iterations;
-        work.bounds.clear();
-        let rest = self.plan.rest_lengths.iter();
-        work.bounds.extend(rest.zip(displacements).map(|(length, d)| length + d));
-        if work.chain.tensions.len() != displacements.len() || !self.newton(work, &mut budget) {
-            return self.solve(displacements, work);
-        }
-        work.load = 1.0;
-        self.report(work);
-        let iterations = self.plan.settings.max_iterations - budget;
-        Ok(Report { status: Status::Converged, residual: work.left.worst(), iterations })
-    }
-
     /// Newton's method from the point at hand; whether it converged to a minimum.
     fn newton(&self, work: &mut Workspace, budget: &mut usize) -> bool {
         let mut before = f64::INFINITY;
@@ -229,10 +207,28 @@ impl Model for Rod<'_> {
         self.robot
     }
 
+    fn elements(&self) -> usize {
+        self.plan.settings.elements
+    }
+
     fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
         let (status, iterations) = self.climb(displacements, work);
         self.report(work);
         Ok(Report { status, residual: work.left.worst(), iterations })
+    }
+
+    fn resume(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+        let mut budget = self.plan.settings.max_iterations;
+        work.bounds.clear();
+        let rest = self.plan.rest_lengths.iter();
+        work.bounds.extend(rest.zip(displacements).map(|(length, d)| length + d));
+        if work.chain.tensions.len() != displacements.len() || !self.newton(work, &mut budget) {
+            return self.solve(displacements, work);
+        }
+        work.load = 1.0;
+        self.report(work);
+        let iterations = self.plan.settings.max_iterations - budget;
+        Ok(Report { status: Status::Converged, residual: work.left.worst(), iterations })
     }
 
     fn state<'w>(&self, work: &'w Workspace) -> &'w State {
