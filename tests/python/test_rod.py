@@ -362,6 +362,7 @@ def test_pictures_show_rods():
     ax = shape.plot()
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     assert "rod model, converged" in ax.get_title()
+    assert "slack" not in labels[0]
     assert "slack" in labels[1]
     assert "free" in labels[2]
     ax.figure.clear()
