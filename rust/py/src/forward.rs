@@ -206,7 +206,8 @@ fn one_tension_each(robot: &Bound<'_, Robot>, tensions: &Bound<'_, PyAny>) -> Py
         let expected = format!("shape ({tendons},), one value per tendon");
         return Err(wrong_shape("tensions", &expected, array.shape()));
     }
-    Ok(values(&array)?.to_vec())
+    // Adding 0.0 turns -0.0 into 0.0.
+    Ok(values(&array)?.iter().map(|tension| tension + 0.0).collect())
 }
 
 /// A model by name with its settings.
