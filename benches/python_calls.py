@@ -48,25 +48,49 @@ def line(name: str, many: Callable[[int], object], one: Callable[[int], object],
     call = best(calls, 1) / rows
     gain = core / (best(partial(many, 2), 1) / rows)
     print(
-        f"{name:32} {core * 1e6:10.2f} {call * 1e6:10.2f} {(call - core) * 1e6:8.2f} {gain:7.2f}x"
+        f"{name:34} {core * 1e6:10.2f} {call * 1e6:10.2f} {(call - core) * 1e6:8.2f} {gain:7.2f}x"
     )
 
 
-def linkages(rng: np.random.Generator) -> None:
-    """Forward solves of the linkage model."""
+def forwards(rng: np.random.Generator, model: str, furthest: float) -> None:
+    """Forward solves of a model, pulls up to a share of the length."""
     for kind in ("uniform", "varied"):
         for n in (1, 10, 100, 1000):
             trunk = robot(n, kind)
-            rows = -0.02 * n * rng.uniform(0.02, 0.08, (64, 2))
+            rows = -0.02 * n * rng.uniform(furthest / 4, furthest, (64, 2))
             rows = np.tile(rows, (max(1, 400 // n), 1))
-            forward = partial(tdcr.forward_batch, trunk, rows, model="linkage")
+            forward = partial(tdcr.forward_batch, trunk, rows, model=model)
             assert forward().ok.all()
             line(
-                f"linkage, {kind}, n = {n}",
+                f"{model}, {kind}, n = {n}",
                 lambda threads, forward=forward: forward(threads=threads),
-                lambda i, trunk=trunk, rows=rows: tdcr.forward(trunk, rows[i], model="linkage"),
+                lambda i, trunk=trunk, rows=rows: tdcr.forward(trunk, rows[i], model=model),
                 len(rows),
             )
+
+
+def rod_paths() -> None:
+    """Rods along a path: every row from rest, or from the row before."""
+    trunk = robot(20, "varied")
+    t = np.linspace(0, 2 * np.pi, 2000)
+    rows = -0.01 * (1 + 0.5 * np.stack([np.cos(t), np.sin(t)], axis=1))
+    for warm in (False, True):
+        forward = partial(tdcr.forward_batch, trunk, rows, warm=warm)
+        before = [tdcr.forward(trunk, rows[0])] if warm else [None]
+
+        def follow(i: int, before: list[tdcr.Shape | None] = before) -> None:
+            shape = tdcr.forward(trunk, rows[i], start=before[0])
+            before[:] = [shape if before[0] else None]
+
+        solved = forward()
+        assert solved.ok.all()
+        start = f"{'warm' if warm else 'cold'}, {solved.iterations.mean():.1f} steps"
+        line(
+            f"rod, path, n = 20, {start}",
+            lambda threads, forward=forward: forward(threads=threads),
+            follow,
+            len(rows),
+        )
 
 
 def inverses(rng: np.random.Generator) -> None:
@@ -103,8 +127,10 @@ def inverses(rng: np.random.Generator) -> None:
 def main() -> None:
     """Print a table."""
     rng = np.random.default_rng(0)
-    print(f"{'':32} {'core [us]':>10} {'call [us]':>10} {'on top':>8} {'threads':>8}")
-    linkages(rng)
+    print(f"{'':34} {'core [us]':>10} {'call [us]':>10} {'on top':>8} {'threads':>8}")
+    forwards(rng, "rod", 0.08)
+    rod_paths()
+    forwards(rng, "linkage", 0.08)
     inverses(rng)
 
 

@@ -6,11 +6,11 @@ tendon's length inside the robot: negative pulls.
 
 >>> import tdcr
 >>> robot = tdcr.Robot(tdcr.Backbone(0.2, 20), [tdcr.Tendon(0.0, 0.01)])
->>> shape = tdcr.forward(robot, [-0.01], model="linkage")
+>>> shape = tdcr.forward(robot, [-0.01])
 >>> shape.status
 <Status.converged: 'converged'>
 >>> shape.positions[-1].round(4).tolist()
-[0.092, 0.0, 0.1683]
+[0.0918, 0.0, 0.1684]
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from tdcr._core import (
     LinkageSettings,
     PsoSettings,
     Robot,
+    RodSettings,
     Shape,
     Tendon,
     forward,
@@ -56,6 +57,7 @@ __all__ = [
     "NotConverged",
     "PsoSettings",
     "Robot",
+    "RodSettings",
     "Shape",
     "ShapeBatch",
     "Status",

@@ -14,9 +14,15 @@ from tdcr._value import same
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tdcr._core import ConstantCurvatureSettings, LinkageSettings, Robot, Shape
+    from tdcr._core import (
+        ConstantCurvatureSettings,
+        LinkageSettings,
+        Robot,
+        RodSettings,
+        Shape,
+    )
 
-    Settings: TypeAlias = LinkageSettings | ConstantCurvatureSettings
+    Settings: TypeAlias = RodSettings | LinkageSettings | ConstantCurvatureSettings
 
 __all__ = ["ShapeBatch", "forward_batch"]
 
@@ -28,7 +34,8 @@ class ShapeBatch(Sequence["Shape"]):
 
     The fields asked for are attributes, and so are `status` (B,), `ok` (B,), `residual` (B,) and
     `iterations` (B,); reading a field that was not asked for raises. `batch[i]` is a `Shape`,
-    solved anew from its row: the same to the bit.
+    solved anew from its row: the same to the bit. Of a warm batch that takes the rows of its block
+    up to it, 64 at most.
 
     Attributes
     ----------
@@ -36,7 +43,9 @@ class ShapeBatch(Sequence["Shape"]):
     displacements : ndarray, shape (B, K)
         Negative pulls [m].
     model : str
-    settings : LinkageSettings or ConstantCurvatureSettings or None
+    settings : RodSettings, LinkageSettings or ConstantCurvatureSettings or None
+    warm : bool
+        Whether rows started from the row before.
     fields : tuple of str
         Names of the fields that were asked for.
     tip : ndarray, shape (B, 4, 4)
@@ -47,6 +56,7 @@ class ShapeBatch(Sequence["Shape"]):
         Centre of every disk [m].
     strains : ndarray, shape (B, n, 3)
         Rotation vector of every element [rad]; (B, n, 4) with the elongation in extensible models.
+        A rod of m elements per subsegment has n m of them.
     tendon_points : list of ndarray, shape (B, end + 1, 3)
         Holes of every tendon [m].
     tendon_lengths : ndarray, shape (B, K)
@@ -67,12 +77,14 @@ class ShapeBatch(Sequence["Shape"]):
         model: str,
         settings: Settings | None,
         columns: dict[str, Any],
+        warm: bool = False,
     ) -> None:
         self.__dict__.update(
             robot=robot,
             displacements=displacements,
             model=model,
             settings=settings,
+            warm=warm,
             _columns=columns,
         )
 
@@ -80,6 +92,7 @@ class ShapeBatch(Sequence["Shape"]):
     displacements: NDArray[np.float64]
     model: str
     settings: Settings | None
+    warm: bool
     _columns: dict[str, Any]
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -113,11 +126,12 @@ class ShapeBatch(Sequence["Shape"]):
         return tuple(name for name in FIELDS if name in self._columns)
 
     def __eq__(self, other: object) -> bool:
-        """Compare by value: the same robot, rows, model, settings and computed fields."""
+        """Compare by value: the same robot, rows, model, settings, starts and computed fields."""
         if not isinstance(other, ShapeBatch):
             return NotImplemented
         return (
             (self.robot, self.model, self.settings) == (other.robot, other.model, other.settings)
+            and self.warm == other.warm
             and np.array_equal(self.displacements, other.displacements)
             and self._columns.keys() == other._columns.keys()
             and all(same(mine, other._columns[name]) for name, mine in self._columns.items())
@@ -135,8 +149,12 @@ class ShapeBatch(Sequence["Shape"]):
         """Return the shape of one row, or a list of shapes for a slice."""
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
-        row = self.displacements[range(len(self))[index]]
-        return _core.forward(self.robot, row, model=self.model, settings=self.settings)
+        row = range(len(self))[index]
+        if self.warm:
+            settings: Any = self.settings
+            return _core._chained_shape(self.robot, self.displacements, row, settings)
+        own = self.displacements[row]
+        return _core.forward(self.robot, own, model=self.model, settings=self.settings)
 
     def __repr__(self) -> str:
         """Tell size, outcome and fields."""
@@ -151,9 +169,10 @@ def forward_batch(
     robot: Robot,
     displacements: ArrayLike,
     *,
-    model: str,
+    model: str = "rod",
     settings: Settings | None = None,
     fields: Sequence[str] = ("tip",),
+    warm: bool = False,
     threads: int | None = None,
     progress: bool | Callable[[int], object] = False,
 ) -> ShapeBatch:
@@ -169,6 +188,11 @@ def forward_batch(
     fields : sequence of str, optional
         What to compute of "tip", "frames", "positions", "strains", "tendon_points",
         "tendon_lengths", "tensions", "energy". Status, residual and iterations always are.
+    warm : bool, optional
+        Whether a row starts from the solution of the row before, not from rest: faster where
+        neighbours are alike, as on a path. Model "rod" only. The first row of every 64 starts from
+        rest, and so does one after a row that failed or had other tendons free. Where several
+        shapes are stable under the same displacements, it may be another one than from rest.
     threads : int, optional
         Default: all cores. The answer does not depend on it.
     progress : bool or callable, optional
@@ -184,7 +208,7 @@ def forward_batch(
     ------
     InvalidInput
         As `forward`, before any row is solved and naming the row; an unknown field, a number of
-        threads below 1.
+        threads below 1, `warm` with another model than the rod.
     KeyboardInterrupt
         On Ctrl-C, within about 0.1 s.
     """
@@ -200,5 +224,6 @@ def forward_batch(
             fields=list(fields),
             threads=threads,
             progress=tell,
+            warm=warm,
         )
-    return ShapeBatch(robot, columns.pop("displacements"), model, settings, columns)
+    return ShapeBatch(robot, columns.pop("displacements"), model, settings, columns, warm)

@@ -98,8 +98,7 @@ def _numbers(context: click.Context, parameter: click.Parameter, text: str) -> l
 
 @_group.command(
     "forward",
-    epilog="\b\nExample:\n"
-    '  tdcr forward trunk.toml -d "-70 free free free" --unit mm --model linkage',
+    epilog='\b\nExample:\n  tdcr forward trunk.toml -d "-70 free free free" --unit mm',
 )
 @click.argument("robot", type=click.Path(path_type=Path))
 @click.option(
@@ -112,7 +111,10 @@ def _numbers(context: click.Context, parameter: click.Parameter, text: str) -> l
     "0 holds, inf or free leaves the tendon idle.",
 )
 @click.option(
-    "--model", required=True, help="How the shape is found: linkage or constant_curvature."
+    "--model",
+    default="rod",
+    show_default=True,
+    help="How the shape is found: rod, linkage or constant_curvature.",
 )
 @click.option(
     "--unit",
@@ -175,7 +177,7 @@ def _demo(output: Path | None) -> int:
         resource = resources.files("tdcr") / "robots" / f"{name}.toml"
         with resources.as_file(resource) as path:
             robot = Robot.load(path)
-        shapes.append(forward(robot, displacements, model="linkage"))
+        shapes.append(forward(robot, displacements))
         times.append(min(_timed(robot, displacements) for _ in range(10)))
     _report.print_demo(shapes, times)
     if output is not None:
@@ -188,7 +190,7 @@ def _demo(output: Path | None) -> int:
 
 def _timed(robot: Robot, displacements: Sequence[float]) -> float:
     start = perf_counter()
-    forward(robot, displacements, model="linkage")
+    forward(robot, displacements)
     return perf_counter() - start
 
 

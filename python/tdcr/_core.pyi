@@ -15,6 +15,7 @@ __all__ = [
     "LinkageSettings",
     "PsoSettings",
     "Robot",
+    "RodSettings",
     "Shape",
     "Tendon",
     "__version__",
@@ -24,6 +25,7 @@ __all__ = [
     "_arc_frames",
     "_arc_from_displacements",
     "_arc_jacobian",
+    "_chained_shape",
     "_displacements_from_arc",
     "_fields",
     "_forward_batch",
@@ -193,6 +195,35 @@ class Robot:
     def rest_lengths(self) -> _Array: ...
     @property
     def rest_frames(self) -> _Array: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class RodSettings:
+    def __new__(
+        cls,
+        *,
+        subsegment: str = "arc",
+        tendons: str = "sliding",
+        elements: int = 1,
+        axial: bool = False,
+        tolerance: float = 1e-11,
+        max_iterations: int = 600,
+    ) -> Self: ...
+    @property
+    def subsegment(self) -> str: ...
+    @property
+    def tendons(self) -> str: ...
+    @property
+    def elements(self) -> int: ...
+    @property
+    def axial(self) -> bool: ...
+    @property
+    def tolerance(self) -> float: ...
+    @property
+    def max_iterations(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -390,17 +421,19 @@ class InverseSettings:
 
 def forward(
     robot: Robot,
-    displacements: ArrayLike,
+    displacements: ArrayLike | None = None,
     *,
-    model: str,
-    settings: LinkageSettings | ConstantCurvatureSettings | None = None,
+    tensions: ArrayLike | None = None,
+    model: str = "rod",
+    settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None = None,
+    start: Shape | None = None,
 ) -> Shape: ...
 def jacobian(
     robot: Robot,
     displacements: ArrayLike,
     *,
     model: str,
-    settings: LinkageSettings | ConstantCurvatureSettings | None = None,
+    settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None = None,
 ) -> _Array: ...
 def _fields() -> tuple[str, ...]: ...
 def _forward_batch(
@@ -408,11 +441,15 @@ def _forward_batch(
     displacements: ArrayLike,
     *,
     model: str,
-    settings: LinkageSettings | ConstantCurvatureSettings | None,
+    settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None,
     fields: list[str],
     threads: int | None,
     progress: Callable[[int], object] | None,
+    warm: bool,
 ) -> dict[str, Any]: ...
+def _chained_shape(
+    robot: Robot, displacements: ArrayLike, row: int, settings: RodSettings | None
+) -> Shape: ...
 def _inverse(
     robot: Robot,
     target: ArrayLike,

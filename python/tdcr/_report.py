@@ -87,7 +87,7 @@ def print_shape(shape: Shape, unit: str) -> None:
     ):
         facts.add_row(_text(name), _text(text))
     known = bool(np.isfinite(shape.tensions).any())
-    force = "N" if shape.units == "SI" else "EI/m^2"
+    force = "N" if shape.units == "N" else "EI/m^2"
     headers = [f"{name} [{unit}]" for name in ("displacement", "rest length", "length")]
     tendons = _table(console, "tendon", *headers, *([f"tension [{force}]"] if known else []))
     for k, name in enumerate(shape.robot.tendon_names):

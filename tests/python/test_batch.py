@@ -189,6 +189,8 @@ def test_progress_bar_goes_to_stderr():
     "call",
     [
         'tdcr.forward_batch(robot, np.full((40_000, 1), -0.01), model="linkage")',
+        "tdcr.forward_batch(robot, np.full((400_000, 1), -0.01))",
+        "tdcr.forward_batch(robot, np.full((400_000, 1), -0.01), warm=True)",
         # Out of reach: every row takes all its starts.
         'tdcr.inverse_batch(finger, np.full((40_000, 3), 0.5), model="constant_curvature")',
         'tdcr.track(finger, np.full((40_000, 3), 0.5), model="constant_curvature")',

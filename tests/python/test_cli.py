@@ -64,6 +64,26 @@ def test_forward_prints_the_shape(robot, capsys):
     assert rows["t1"][:2] == ["free", "200.000"]
 
 
+def test_the_model_is_the_rod_if_none_is_named(robot, capsys):
+    assert main(["forward", robot, "-d", "-10, free", "--unit", "mm"]) == 0
+    rows = {
+        line.split()[0]: line.split()[1:] for line in capsys.readouterr().out.splitlines() if line
+    }
+    assert rows["model"] == ["rod"]
+    shape = tdcr.forward(tdcr.Robot.load(robot), [-0.01, math.inf])
+    assert rows["t0"] == ["-10.000", "200.000", "190.000", f"{shape.tensions[0]:.6g}"]
+    assert rows["t1"][0] == "free"
+    assert rows["t1"][-1] == "0"
+
+
+def test_the_table_names_the_unit_of_tensions(robot, tmp_path, capsys):
+    known = tmp_path / "steel.toml"
+    known.write_text(ROBOT.replace("[[ten", "youngs_modulus = 2e11\ndiameter = 1\n[[ten", 1))
+    for path, unit in ((robot, "[EI/m^2]"), (str(known), "[N]")):
+        assert main(["forward", path, "-d", "-0.01 inf"]) == 0
+        assert f"tension {unit}" in capsys.readouterr().out
+
+
 def test_json_is_the_shape_in_si(robot, capsys):
     assert main(["forward", robot, "-d", "-0.01 inf", "--model", "linkage", "--json", "-"]) == 0
     data = json.loads(capsys.readouterr().out)
@@ -97,8 +117,7 @@ BAD = [
     (["-d", "-0.01 -inf", "--model", "linkage"], "or free, got '-inf'"),
     (["-d", "-0.01 1e999", "--model", "linkage"], "or free, got '1e999'"),
     (["-d", "-0.01 x", "--model", "linkage"], "expected finite numbers, inf or free, got 'x'"),
-    (["-d", "-0.01 inf", "--model", "spline"], 'model: expected "linkage"'),
-    (["-d", "-0.01 inf"], "--model"),
+    (["-d", "-0.01 inf", "--model", "spline"], 'model: expected "rod", "linkage"'),
     (["-d", "-1 inf", "--model", "linkage", "--unit", "cm"], "'cm' is not one of 'm', 'mm'"),
     (["--model", "linkage"], "--displacements"),
     (["-d", "-0.01 inf", "--model", "linkage", "--json", "/none/x"], "/none/x: No such file"),

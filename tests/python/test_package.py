@@ -41,7 +41,15 @@ def test_public_names_are_documented(name):
 
 def test_docstrings_carry_units_shapes_and_errors():
     text = inspect.getdoc(tdcr.forward)
-    for words in ("shape (K,)", "[m]", "Raises", "InvalidInput", "Ashwin & Ghosal", "Returns"):
+    for words in (
+        "shape (K,)",
+        "[m]",
+        "Raises",
+        "InvalidInput",
+        "Ashwin & Ghosal",
+        "Mahapatra",
+        "Returns",
+    ):
         assert words in text, words
     assert (
         inspect.signature(tdcr.forward).parameters["model"].kind is inspect.Parameter.KEYWORD_ONLY
@@ -53,8 +61,9 @@ def test_doctests_run():
     assert doctest.testmod(tdcr).attempted > 0
 
 
-def test_the_readme_s_code_runs(tmp_path, monkeypatch):
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+@pytest.mark.parametrize("page", ["README.md", "docs/rod.md"])
+def test_the_pages_code_runs(page, tmp_path, monkeypatch):
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)
     assert blocks
     monkeypatch.chdir(tmp_path)
     for block in blocks:

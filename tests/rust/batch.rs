@@ -3,10 +3,11 @@
 use std::sync::atomic::Ordering;
 
 use tdcr::Status;
-use tdcr::batch::{Control, Field, Key, pool, solve_rows};
+use tdcr::batch::{Control, Field, Key, chain_rows, chained_shape, pool, solve_rows};
 use tdcr::linkage::{Linkage, LinkageSettings, Plan};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+use tdcr::rod::{self, Rod, RodSettings};
 
 const ALL: &[Field] = &Field::ALL;
 
@@ -63,6 +64,57 @@ fn rows_equal_single_solves_on_any_number_of_threads() {
         assert_eq!(&of(Key::TendonPoints(1))[3 * (6 * i + 5)..3 * (6 * i + 6)], last.as_slice());
         assert!(of(Key::Tensions)[2 * i].is_nan());
     }
+}
+
+#[test]
+fn chains_start_from_rest_every_64_rows_and_where_the_row_before_is_of_no_use() {
+    let robot = robot();
+    let settings = RodSettings { elements: 2, ..Default::default() };
+    let plan = rod::Plan::new(&robot, settings).unwrap();
+    let model = Rod::new(&robot, &plan);
+    // A tendon is let go in row 100 and taken up again in row 110; nothing follows row 30.
+    let rows: Vec<f64> = (0..200)
+        .flat_map(|i| {
+            let pull = 5e-5 * f64::from(i);
+            let first = if i == 30 { 0.25 } else { pull };
+            [-first, if (100..110).contains(&i) { f64::INFINITY } else { -0.8 * pull }]
+        })
+        .collect();
+    let keys = [Field::Frames, Field::Strains, Field::Tensions];
+    let warm = |threads| {
+        let pool = pool(Some(threads)).unwrap();
+        chain_rows(&model, &rows, 200, &keys, &pool, &Control::default()).unwrap().unwrap()
+    };
+    let (one, three) = (warm(1), warm(3));
+    let pool = pool(Some(2)).unwrap();
+    let cold = solve_rows(&model, &rows, 200, &keys, &pool, &Control::default());
+    let cold = cold.unwrap().unwrap();
+    assert_eq!(one.reports, three.reports);
+    let part = |key, solved: &tdcr::batch::Solved, i: usize| {
+        let values = solved.values(key).unwrap();
+        let width = values.len() / 200;
+        values[i * width..(i + 1) * width].to_vec()
+    };
+    let (mut steps, mut steps_cold) = (0, 0);
+    for i in 0..200 {
+        let shape = chained_shape(&model, &rows, i).unwrap();
+        assert_eq!(shape.report, one.reports[i]);
+        assert_eq!(part(Key::Tensions, &one, i), shape.state.tensions);
+        assert_eq!(part(Key::Strains, &one, i).len(), 3 * 2 * 5);
+        let frames = part(Key::Frames, &one, i);
+        assert_eq!(frames, part(Key::Frames, &three, i));
+        assert_eq!(cold.reports[i].status == Status::Converged, i != 30);
+        assert_eq!(one.reports[i].status, cold.reports[i].status);
+        let off = frames.iter().zip(part(Key::Frames, &cold, i)).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-10, "row {i}");
+        if [0, 31, 64, 128, 192].contains(&i) {
+            assert_eq!(one.reports[i], cold.reports[i]);
+            assert_eq!(frames, part(Key::Frames, &cold, i));
+        }
+        steps += one.reports[i].iterations;
+        steps_cold += cold.reports[i].iterations;
+    }
+    assert!(5 * steps < 4 * steps_cold, "{steps} steps warm, {steps_cold} cold");
 }
 
 #[test]

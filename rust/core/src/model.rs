@@ -72,6 +72,11 @@ pub trait Model: Sync {
         3
     }
 
+    /// Elements between two disks, each with a row of strains.
+    fn elements(&self) -> usize {
+        1
+    }
+
     /// Solves for checked displacements \[m\]; see [`Robot::check_displacements`]. A solve that does
     /// not converge is a report, with the last iterate in the state.
     ///
@@ -82,6 +87,19 @@ pub trait Model: Sync {
         displacements: &[f64],
         work: &mut Self::Workspace,
     ) -> Result<Report, InvalidInput>;
+
+    /// As [`Model::solve`], from what the last solve of this model left in `work`, where the model can
+    /// start from that.
+    ///
+    /// # Errors
+    /// As [`Model::solve`].
+    fn resume(
+        &self,
+        displacements: &[f64],
+        work: &mut Self::Workspace,
+    ) -> Result<Report, InvalidInput> {
+        self.solve(displacements, work)
+    }
 
     /// The solved quantities of the last solve in `work`.
     fn state<'w>(&self, work: &'w Self::Workspace) -> &'w State;
@@ -100,7 +118,12 @@ pub trait Model: Sync {
         self.robot().check_displacements(displacements)?;
         let mut work = Self::Workspace::default();
         let report = self.solve(displacements, &mut work)?;
+        Ok(self.result(displacements, report, work))
+    }
+
+    /// The whole result of the last solve in `work`.
+    fn result(&self, displacements: &[f64], report: Report, work: Self::Workspace) -> Shape {
         let message = self.message(displacements, &work);
-        Ok(Shape { state: self.take_state(work), report, message })
+        Shape { state: self.take_state(work), report, message }
     }
 }

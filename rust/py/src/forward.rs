@@ -5,30 +5,39 @@ use pyo3::PyTypeInfo;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
+use rayon::ThreadPool;
 
-use tdcr::batch::{Field, Key, Solved, pool, solve_rows};
+use tdcr::batch::{Field, Key, Solved, chain_rows, pool, solve_rows};
 use tdcr::constant_curvature::{self, ConstantCurvature, ConstantCurvatureSettings};
 use tdcr::linkage::{Linkage, LinkageSettings};
 use tdcr::model::Model;
+use tdcr::rod::{Rod, RodSettings};
 use tdcr::{InvalidInput, Status};
 
 use crate::arguments::{optional, whole};
 use crate::convert::{float_array, frozen, invalid, status, type_name, values, wrong_shape};
 use crate::long_call;
 use crate::robot::Robot;
+use crate::rod::{self, Load};
 use crate::settings;
 use crate::shape::Shape;
 
-/// From tendon displacements to the shape.
+/// From tendon displacements, or tensions, to the shape.
 ///
 /// Parameters
 /// ----------
 /// robot : Robot
-/// displacements : array_like, shape (K,)
+/// displacements : array_like, shape (K,), optional
 ///     Change of each tendon's length inside the robot, in the order of `robot.tendons` [m].
 ///     Negative pulls, positive releases, 0 holds the tendon at its rest length, `inf` frees it. A
 ///     tendon can only pull: its length is at most rest length plus displacement.
-/// model : {"linkage", "constant_curvature"}
+/// tensions : array_like, shape (K,), optional
+///     Tension of each tendon instead, finite and not negative [N, or 1/m^2 in units of EI where
+///     the backbone's Young's modulus is not given]. Model "rod" only. The displacements of the shape are
+///     then what its tendons have: length minus length at rest.
+/// model : {"rod", "linkage", "constant_curvature"}, optional
+///     "rod": the least strain energy under frictionless tendons, for any routing, rest shape and number of
+///     tendons (Mahapatra & Ghosal 2024). The one with tensions.
 ///     "linkage": a chain of four-bar (one tendon) or seven-bar linkages (two), the constrained
 ///     minimum of the coupler angles (Ashwin & Ghosal, "Forward kinematics of cable-driven
 ///     continuum robot using optimization method"). The two most-pulled tendons on different lines
@@ -37,8 +46,11 @@ use crate::shape::Shape;
 ///     "constant_curvature": every segment an arc, by least squares over all its tendons
 ///     (opencontinuumrobotics.com). Bilateral: displacements count as given, but for free tendons and
 ///     the only, released one of a segment. Straight backbones and straight routing only.
-/// settings : LinkageSettings or ConstantCurvatureSettings, optional
+/// settings : RodSettings, LinkageSettings or ConstantCurvatureSettings, optional
 ///     Those of the model.
+/// start : Shape, optional
+///     A shape of this robot and model "rod" with as many elements, under displacements near by: the
+///     solve starts there, not at rest. A start that does not help is dropped.
 ///
 /// Returns
 /// -------
@@ -48,35 +60,78 @@ use crate::shape::Shape;
 /// Raises
 /// ------
 /// InvalidInput
-///     NaN, -inf, another number of displacements than tendons, a (B, K) array, an unknown model, a
-///     pre-bent backbone, two linkage tendons on one azimuth, settings of another model, a routing
-///     that the model does not take.
+///     Both or neither of displacements and tensions, NaN, -inf, another number of values than
+///     tendons, a (B, K) array, a negative or infinite tension, tensions or a start for another model
+///     than the rod, a start of another robot, model or number of elements, an unknown model, settings of
+///     another model, axial strain or elastic tendons without Young's modulus; in the models that take
+///     no others a pre-bent backbone, a routing, two linkage tendons on one azimuth.
 /// TypeError
 ///     A value of another type.
 #[pyfunction]
-#[pyo3(signature = (robot, displacements, *, model, settings=None))]
+#[pyo3(signature = (robot, displacements=None, *, tensions=None, model="rod", settings=None, start=None))]
 pub(crate) fn forward(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
-    displacements: &Bound<'_, PyAny>,
+    displacements: Option<&Bound<'_, PyAny>>,
+    tensions: Option<&Bound<'_, PyAny>>,
     model: &str,
     settings: Option<&Bound<'_, PyAny>>,
+    start: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Shape> {
     let choice = Choice::new(model, settings)?;
-    let displacements = one_row(robot, displacements)?;
+    let load = load(robot, displacements, tensions)?;
     let solved = robot.get();
-    let shape = py
-        .detach(|| match choice {
-            Choice::Linkage(settings) => {
-                Linkage::new(&solved.0, solved.linkage_plan()?, settings)?.shape(&displacements)
+    let core = &solved.0;
+    let (displacements, shape) = match (choice, load) {
+        (Choice::Rod(settings), load) => {
+            if let (Load::Tensions(_), Some(_)) = (&load, start) {
+                let expected = "none beside tensions, which are reached from rest";
+                return Err(invalid(&InvalidInput::new("start", expected, "one")));
             }
-            Choice::ConstantCurvature(settings) => {
+            let start = start.map(|start| rod::start(core, &settings, start)).transpose()?;
+            py.detach(|| rod::solve(core, &*solved.rod_plan(settings)?, load, start))
+        }
+        (_, Load::Tensions(_)) => return Err(rod_only("tensions", model)),
+        _ if start.is_some() => return Err(rod_only("start", model)),
+        (Choice::Linkage(settings), Load::Displacements(displacements)) => py.detach(|| {
+            let linkage = Linkage::new(core, solved.linkage_plan()?, settings)?;
+            let shape = linkage.shape(&displacements)?;
+            Ok((displacements, shape))
+        }),
+        (Choice::ConstantCurvature(settings), Load::Displacements(displacements)) => {
+            py.detach(|| {
                 let plan = solved.constant_curvature_plan(settings)?;
-                ConstantCurvature::new(&solved.0, plan).shape(&displacements)
-            }
-        })
-        .map_err(|e| invalid(&e))?;
+                let shape = ConstantCurvature::new(core, plan).shape(&displacements)?;
+                Ok((displacements, shape))
+            })
+        }
+    }
+    .map_err(|e| invalid(&e))?;
     Ok(Shape::new(solved.clone(), model, displacements, shape))
+}
+
+/// What is given: displacements or tensions, not both.
+fn load(
+    robot: &Bound<'_, Robot>,
+    displacements: Option<&Bound<'_, PyAny>>,
+    tensions: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Load> {
+    let refuse = |argument: &str, got: &str| {
+        let expected = "displacements or tensions";
+        Err(invalid(&InvalidInput::new(argument, expected, got)))
+    };
+    match (displacements, tensions) {
+        (Some(given), None) => one_row(robot, given).map(Load::Displacements),
+        (None, Some(given)) => one_tension_each(robot, given).map(Load::Tensions),
+        (None, None) => refuse("displacements", "neither"),
+        (Some(_), Some(_)) => refuse("tensions", "both"),
+    }
+}
+
+/// An argument that models without forces or starts do not take.
+fn rod_only(argument: &str, model: &str) -> PyErr {
+    let got = format!("{argument} for model \"{model}\"");
+    invalid(&InvalidInput::new(argument, "none, or model \"rod\"", got))
 }
 
 /// Velocity of the tool point per metre of tendon displacement.
@@ -111,9 +166,12 @@ pub(crate) fn jacobian(
     model: &str,
     settings: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Py<PyAny>> {
-    let Choice::ConstantCurvature(settings) = Choice::new(model, settings)? else {
-        let expected = "a model with derivatives (\"constant_curvature\")";
-        return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
+    let settings = match Choice::new(model, settings)? {
+        Choice::ConstantCurvature(settings) => settings,
+        Choice::Rod(_) | Choice::Linkage(_) => {
+            let expected = "a model with derivatives (\"constant_curvature\")";
+            return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
+        }
     };
     let displacements = one_row(robot, displacements)?;
     let solved = robot.get();
@@ -140,9 +198,22 @@ fn one_row(robot: &Bound<'_, Robot>, displacements: &Bound<'_, PyAny>) -> PyResu
     }
 }
 
+/// Tensions of one solve.
+fn one_tension_each(robot: &Bound<'_, Robot>, tensions: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let array = float_array("tensions", tensions)?;
+    let tendons = robot.get().0.tendons().len();
+    if array.shape() != [tendons] {
+        let expected = format!("shape ({tendons},), one value per tendon");
+        return Err(wrong_shape("tensions", &expected, array.shape()));
+    }
+    // Adding 0.0 turns -0.0 into 0.0.
+    Ok(values(&array)?.iter().map(|tension| tension + 0.0).collect())
+}
+
 /// A model by name with its settings.
 #[derive(Clone, Copy)]
 pub(crate) enum Choice {
+    Rod(RodSettings),
     Linkage(LinkageSettings),
     ConstantCurvature(ConstantCurvatureSettings),
 }
@@ -151,6 +222,10 @@ impl Choice {
     /// Checks the name, and that the settings are those of this model.
     pub(crate) fn new(model: &str, settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         match model {
+            "rod" => {
+                let given = own_settings::<rod::RodSettings>(model, settings)?;
+                Ok(Self::Rod(given.map_or_else(Default::default, |s| s.get().0)))
+            }
             "linkage" => {
                 let given = own_settings::<settings::LinkageSettings>(model, settings)?;
                 Ok(Self::Linkage(given.map_or_else(Default::default, |s| s.get().0)))
@@ -160,7 +235,7 @@ impl Choice {
                 Ok(Self::ConstantCurvature(given.map_or_else(Default::default, |s| s.get().0)))
             }
             _ => {
-                let expected = "\"linkage\" or \"constant_curvature\"";
+                let expected = "\"rod\", \"linkage\" or \"constant_curvature\"";
                 let got = format!("\"{model}\"");
                 Err(invalid(&InvalidInput::new("model", expected, got)))
             }
@@ -178,7 +253,8 @@ fn own_settings<'a, 'py, T: PyTypeInfo>(
     settings.cast::<T>().map(Some).map_err(|_| {
         let expected = T::type_object(settings.py()).name().map(|name| name.to_string());
         let (expected, got) = (expected.unwrap_or_default(), type_name(settings));
-        let known = settings.is_instance_of::<settings::LinkageSettings>()
+        let known = settings.is_instance_of::<rod::RodSettings>()
+            || settings.is_instance_of::<settings::LinkageSettings>()
             || settings.is_instance_of::<settings::ConstantCurvatureSettings>();
         if known {
             let expected = format!("{expected} for model \"{model}\"");
@@ -197,7 +273,7 @@ pub(crate) fn _fields(py: Python<'_>) -> PyResult<Bound<'_, PyTuple>> {
 
 /// Columns of a batch by field name; `tdcr.forward_batch` is the face of it.
 #[pyfunction]
-#[pyo3(signature = (robot, displacements, *, model, settings, fields, threads, progress))]
+#[pyo3(signature = (robot, displacements, *, model, settings, fields, threads, progress, warm))]
 #[allow(clippy::too_many_arguments)] // The keywords of forward_batch.
 pub(crate) fn _forward_batch<'py>(
     py: Python<'py>,
@@ -208,8 +284,13 @@ pub(crate) fn _forward_batch<'py>(
     fields: Vec<String>,
     threads: Option<&Bound<'py, PyAny>>,
     progress: Option<&Bound<'py, PyAny>>,
+    warm: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let choice = Choice::new(model, settings)?;
+    if warm && !matches!(choice, Choice::Rod(_)) {
+        let got = format!("True for model \"{model}\"");
+        return Err(invalid(&InvalidInput::new("warm", "False, or model \"rod\"", got)));
+    }
     let core = &robot.get().0;
     let tendons = core.tendons().len();
     let array = float_array("displacements", displacements)?;
@@ -226,27 +307,52 @@ pub(crate) fn _forward_batch<'py>(
     let threads = optional("threads", threads, whole)?;
     let pool = pool(threads).map_err(|e| invalid(&e))?;
     let flat = values(&array)?;
+    let batch = Batch { displacements: flat, rows, fields: &fields, pool: &pool, warm };
+    let kept = robot.get();
     let solved = match choice {
+        Choice::Rod(settings) => {
+            let plan = kept.rod_plan(settings).map_err(|e| invalid(&e))?;
+            batch.solve(py, &Rod::new(core, &plan), progress)
+        }
         Choice::Linkage(settings) => {
-            let plan = robot.get().linkage_plan().map_err(|e| invalid(&e))?;
+            let plan = kept.linkage_plan().map_err(|e| invalid(&e))?;
             let model = Linkage::new(core, plan, settings).map_err(|e| invalid(&e))?;
-            long_call::run(py, progress, |control| {
-                solve_rows(&model, flat, rows, &fields, &pool, control)
-            })?
+            batch.solve(py, &model, progress)
         }
         Choice::ConstantCurvature(settings) => {
-            let plan = robot.get().constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
-            let model = ConstantCurvature::new(core, plan);
-            long_call::run(py, progress, |control| {
-                solve_rows(&model, flat, rows, &fields, &pool, control)
-            })?
+            let plan = kept.constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
+            batch.solve(py, &ConstantCurvature::new(core, plan), progress)
         }
-    };
-    // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
-    let solved = solved.map_err(|e| invalid(&e))?.unwrap_or_default();
+    }?;
     let answer = export(py, &fields, solved)?;
     answer.set_item("displacements", frozen(py, flat.to_vec(), &[rows, tendons])?)?;
     Ok(answer)
+}
+
+/// What all models' batches have.
+struct Batch<'a> {
+    displacements: &'a [f64],
+    rows: usize,
+    fields: &'a [Field],
+    pool: &'a ThreadPool,
+    warm: bool,
+}
+
+impl Batch<'_> {
+    fn solve<M: Model>(
+        &self,
+        py: Python<'_>,
+        model: &M,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Solved> {
+        let &Self { displacements, rows, fields, pool, warm } = self;
+        let solve = if warm { chain_rows } else { solve_rows };
+        let solved = long_call::run(py, progress, |control| {
+            solve(model, displacements, rows, fields, pool, control)
+        })?;
+        // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
+        Ok(solved.map_err(|e| invalid(&e))?.unwrap_or_default())
+    }
 }
 
 fn export<'py>(py: Python<'py>, fields: &[Field], solved: Solved) -> PyResult<Bound<'py, PyDict>> {

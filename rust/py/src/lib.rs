@@ -20,6 +20,7 @@ mod planar_inverse;
 mod pso;
 mod pso_settings;
 mod robot;
+mod rod;
 mod settings;
 mod shape;
 mod tendon;
@@ -58,6 +59,8 @@ mod _core {
     use crate::pso_settings::PsoSettings;
     #[pymodule_export]
     use crate::robot::Robot;
+    #[pymodule_export]
+    use crate::rod::{_chained_shape, RodSettings};
     #[pymodule_export]
     use crate::settings::{
         _rust_defaults, ConstantCurvatureSettings, InverseSettings, LinkageSettings,

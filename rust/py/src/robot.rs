@@ -1,6 +1,6 @@
 //! `Robot`.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -8,6 +8,7 @@ use pyo3::types::{PyDict, PyTuple, PyType};
 
 use tdcr::constant_curvature::{self, ConstantCurvatureSettings};
 use tdcr::robot as core;
+use tdcr::rod::{self, RodSettings};
 use tdcr::{InvalidInput, linkage};
 
 use crate::arguments::{optional, text};
@@ -47,6 +48,8 @@ struct Kept {
     linkage: OnceLock<Result<linkage::Plan, InvalidInput>>,
     /// One per settings; see [`Robot::constant_curvature_plan`].
     constant_curvature: [OnceLock<Result<constant_curvature::Plan, InvalidInput>>; 4],
+    /// The last few settings, latest last.
+    rod: Mutex<Vec<(RodSettings, Arc<rod::Plan>)>>,
     base: Lazy,
     tool: Lazy,
     rest_lengths: Lazy,
@@ -69,6 +72,30 @@ impl Robot {
         let plan = self.1.constant_curvature[place]
             .get_or_init(|| constant_curvature::Plan::new(&self.0, settings));
         plan.as_ref().map_err(InvalidInput::clone)
+    }
+}
+
+/// Rod plans kept with a robot.
+const MOST_PLANS: usize = 8;
+
+impl Robot {
+    /// The plan of the rod model, kept for the settings used last.
+    pub(crate) fn rod_plan(&self, settings: RodSettings) -> Result<Arc<rod::Plan>, InvalidInput> {
+        let kept = || self.1.rod.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut plans = kept();
+        if let Some(place) = plans.iter().position(|(known, _)| *known == settings) {
+            plans[place..].rotate_left(1);
+            return Ok(Arc::clone(&plans[plans.len() - 1].1));
+        }
+        // Nobody waits while it is made; of two made at once both are right.
+        drop(plans);
+        let plan = Arc::new(rod::Plan::new(&self.0, settings)?);
+        let mut plans = kept();
+        if plans.len() >= MOST_PLANS {
+            plans.remove(0);
+        }
+        plans.push((settings, Arc::clone(&plan)));
+        Ok(plan)
     }
 }
 

@@ -7,11 +7,13 @@ use tdcr::InvalidInput;
 use tdcr::constant_curvature as cc;
 use tdcr::inverse;
 use tdcr::linkage;
+use tdcr::rod::RodSettings;
 use tdcr::solve::pso::PsoSettings;
 
 use crate::arguments::{OneOrMany, number, whole};
 use crate::convert::{invalid, one_or_tuple};
 use crate::pso_settings::{self, PsoSettings as PyPsoSettings};
+use crate::rod;
 
 /// How precisely and how long the linkage model solves each subsegment.
 ///
@@ -367,6 +369,7 @@ pub(crate) fn _rust_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     defaults.set_item("ConstantCurvatureSettings", values)?;
     let inverse = InverseSettings(inverse::InverseSettings::default());
     defaults.set_item("InverseSettings", inverse.__getnewargs_ex__(py)?.1)?;
+    defaults.set_item("RodSettings", rod::keywords(py, &RodSettings::default())?)?;
     defaults.set_item("PsoSettings", pso_settings::keywords(py, &PsoSettings::default())?)?;
     Ok(defaults)
 }

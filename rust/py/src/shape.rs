@@ -47,6 +47,14 @@ impl Shape {
     ) -> Self {
         Self { robot, model: model.to_owned(), displacements, core, arrays: Arrays::default() }
     }
+
+    pub(crate) fn core_robot(&self) -> &tdcr::robot::Robot {
+        &self.robot.0
+    }
+
+    pub(crate) fn state(&self) -> &State {
+        &self.core.state
+    }
 }
 
 fn same_bits(a: &[f64], b: &[f64]) -> bool {
@@ -77,11 +85,12 @@ impl Shape {
 
     /// Name of the model that solved it.
     #[getter]
-    fn model(&self) -> &str {
+    pub(crate) fn model(&self) -> &str {
         &self.model
     }
 
-    /// Tendon displacements, shape (K,) [m]: negative pulls, `inf` is free.
+    /// Tendon displacements, shape (K,) [m]: negative pulls, `inf` is free. Of a shape under given
+    /// tensions, what its tendons have: length minus length at rest.
     #[getter]
     fn displacements(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let build = || frozen(py, self.displacements.clone(), &[self.displacements.len()]);
@@ -114,7 +123,7 @@ impl Shape {
 
     /// Rotation vector of every element in the frame of its own base (bending about x and y,
     /// torsion), shape (n, 3) [rad]; with the relative elongation as a fourth column in extensible
-    /// models.
+    /// models. A rod of m elements per subsegment has n m rows, base first.
     #[getter]
     fn strains(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let build = || {
@@ -148,8 +157,8 @@ impl Shape {
         self.arrays.tendon_lengths.get(py, build)
     }
 
-    /// Tension of every tendon, shape (K,) [N, or 1/m^2 when `units` is "EI"]. NaN in the linkage
-    /// and the constant-curvature model, which know no forces.
+    /// Tension of every tendon, shape (K,) [N, or 1/m^2 when `units` is "EI"], 0 where it is slack or
+    /// free. NaN in the linkage and the constant-curvature model, which know no forces.
     #[getter]
     fn tensions(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let tensions = &self.core.state.tensions;
@@ -193,17 +202,17 @@ impl Shape {
         self.core.report.residual
     }
 
-    /// Newton steps taken, all subsegments together.
+    /// Newton steps taken: of the whole rod, else all subsegments together.
     #[getter]
     fn iterations(&self) -> usize {
         self.core.report.iterations
     }
 
-    /// "SI" (J, N) when the backbone's Young's modulus and diameter are known; else "EI": energy in
-    /// 1/m and forces in 1/m^2, both to be multiplied by the bending stiffness EI.
+    /// "N" when the backbone's Young's modulus and diameter are known: tensions in N, energy in J; else
+    /// "EI": tensions in 1/m^2 and energy in 1/m, both to be multiplied by the bending stiffness EI.
     #[getter]
     fn units(&self) -> &'static str {
-        if self.robot.0.backbone().has_stiffness() { "SI" } else { "EI" }
+        if self.robot.0.backbone().has_stiffness() { "N" } else { "EI" }
     }
 
     /// The shape itself if the solve converged.

@@ -1,6 +1,7 @@
 //! The fields of a batch, by name: the one list of them.
 
 use crate::error::InvalidInput;
+use crate::model::Model;
 use crate::robot::Robot;
 
 /// What can be asked of a batch beside status, residual and iterations, which it always has.
@@ -120,13 +121,14 @@ impl Key {
     }
 
     /// Shape of one row.
-    pub(super) fn shape(self, robot: &Robot, strain_width: usize) -> Vec<usize> {
+    pub(super) fn shape<M: Model>(self, model: &M) -> Vec<usize> {
+        let robot = model.robot();
         let n = robot.backbone().subsegments();
         match self {
             Self::Tip => vec![4, 4],
             Self::Frames => vec![n + 1, 4, 4],
             Self::Positions => vec![n + 1, 3],
-            Self::Strains => vec![n, strain_width],
+            Self::Strains => vec![n * model.elements(), model.strain_width()],
             Self::TendonPoints(k) => vec![robot.paths()[k].end() + 1, 3],
             Self::TendonLengths | Self::Tensions => vec![robot.paths().len()],
             Self::Energy => vec![],

@@ -6,4 +6,4 @@ mod rows;
 
 pub use field::{Field, Key};
 pub use pool::pool;
-pub use rows::{Column, Control, Solved, solve_rows};
+pub use rows::{Column, Control, Solved, chain_rows, chained_shape, solve_rows};

@@ -10,6 +10,7 @@ use super::field::{Field, Key};
 use crate::error::InvalidInput;
 use crate::model::{Model, Report, State};
 use crate::robot::Robot;
+use crate::shape::Shape;
 use crate::status::Status;
 
 /// Stop flag and progress of a long call, shared with the thread that waits for it.
@@ -34,7 +35,7 @@ pub struct Column {
 
 impl Column {
     fn new<M: Model>(model: &M, key: Key, rows: usize) -> Result<Self, InvalidInput> {
-        let shape = key.shape(model.robot(), model.strain_width());
+        let shape = key.shape(model);
         let width: usize = shape.iter().product();
         let size = rows.saturating_mul(width);
         // Asked for in earnest only when it can be had; then as zero pages, which the threads that
@@ -75,6 +76,27 @@ struct Job<'a> {
 
 /// Rows of one job: enough to pay for its bookkeeping, few enough to stop and to share well.
 const ROWS_PER_JOB: usize = 32;
+/// Rows of one chain: enough to make its cold start cheap. Fixed, so that answers are the same on any
+/// number of threads.
+const ROWS_PER_CHAIN: usize = 64;
+
+/// Where the solves of a batch start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Start {
+    /// Each from rest.
+    Cold,
+    /// Each from the answer of the row before, in chains of fixed length.
+    Warm,
+}
+
+impl Start {
+    const fn rows_per_job(self) -> usize {
+        match self {
+            Self::Cold => ROWS_PER_JOB,
+            Self::Warm => ROWS_PER_CHAIN,
+        }
+    }
+}
 
 /// Solves every row of `displacements` (`rows` x K, row-major) on `pool`. Returns `None` when it was
 /// stopped.
@@ -90,6 +112,55 @@ pub fn solve_rows<M: Model>(
     pool: &ThreadPool,
     control: &Control,
 ) -> Result<Option<Solved>, InvalidInput> {
+    solve_all(model, displacements, rows, fields, pool, control, Start::Cold)
+}
+
+/// As [`solve_rows`], with a row started from the answer of the row before ([`Model::resume`]) where that
+/// converged. The first of every 64 rows starts from rest, which makes the answers independent of the number
+/// of threads.
+///
+/// # Errors
+/// As [`solve_rows`].
+pub fn chain_rows<M: Model>(
+    model: &M,
+    displacements: &[f64],
+    rows: usize,
+    fields: &[Field],
+    pool: &ThreadPool,
+    control: &Control,
+) -> Result<Option<Solved>, InvalidInput> {
+    solve_all(model, displacements, rows, fields, pool, control, Start::Warm)
+}
+
+/// One row of [`chain_rows`], the same to the bit, with all that belongs to it: its chain is solved up
+/// to there.
+///
+/// # Errors
+/// As [`solve_rows`], for the rows of the chain.
+pub fn chained_shape<M: Model>(
+    model: &M,
+    displacements: &[f64],
+    row: usize,
+) -> Result<Shape, InvalidInput> {
+    let tendons = model.robot().tendons().len();
+    let mut work = M::Workspace::default();
+    let first = row - row % ROWS_PER_CHAIN;
+    let mut report = solve_row(model, displacements, first, None, &mut work)?;
+    for next in first + 1..=row {
+        report = solve_row(model, displacements, next, Some(report.status), &mut work)?;
+    }
+    Ok(model.result(&displacements[row * tendons..(row + 1) * tendons], report, work))
+}
+
+fn solve_all<M: Model>(
+    model: &M,
+    displacements: &[f64],
+    rows: usize,
+    fields: &[Field],
+    pool: &ThreadPool,
+    control: &Control,
+    start: Start,
+) -> Result<Option<Solved>, InvalidInput> {
     let robot = model.robot();
     let tendons = robot.tendons().len();
     let mut reports = Vec::new();
@@ -104,32 +175,32 @@ pub fn solve_rows<M: Model>(
     let keys = Key::of(fields, robot);
     let columns = keys.into_iter().map(|key| Column::new(model, key, rows));
     let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
-    let jobs = jobs(&mut columns, &mut reports);
+    let jobs = jobs(&mut columns, &mut reports, start);
     let failed = pool.install(|| {
         jobs.into_par_iter()
             .map_init(M::Workspace::default, |work, job| {
-                run(model, displacements, work, job, control)
+                run(model, displacements, work, job, control, start)
             })
             .filter_map(Result::err)
             .min_by_key(|(row, _)| *row)
     });
-    if let Some((row, error)) = failed {
-        return Err(in_row(error, row));
+    if let Some((_, error)) = failed {
+        return Err(error);
     }
     let stopped = control.stop.load(Ordering::Relaxed);
     Ok((!stopped).then_some(Solved { columns, reports }))
 }
 
-fn jobs<'a>(columns: &'a mut [Column], reports: &'a mut [Report]) -> Vec<Job<'a>> {
-    let rows = reports.len();
+fn jobs<'a>(columns: &'a mut [Column], reports: &'a mut [Report], start: Start) -> Vec<Job<'a>> {
+    let (rows, per_job) = (reports.len(), start.rows_per_job());
     let mut rest: Vec<(Key, usize, &mut [f64])> = columns
         .iter_mut()
         .map(|column| {
             let width = column.values.len().checked_div(rows).unwrap_or(0);
-            (column.key, ROWS_PER_JOB * width, &mut column.values[..])
+            (column.key, per_job * width, &mut column.values[..])
         })
         .collect();
-    (reports.chunks_mut(ROWS_PER_JOB).enumerate())
+    (reports.chunks_mut(per_job).enumerate())
         .map(|(index, reports)| {
             let columns = rest.iter_mut().map(|(key, size, values)| {
                 let size = (*size).min(values.len());
@@ -137,7 +208,7 @@ fn jobs<'a>(columns: &'a mut [Column], reports: &'a mut [Report]) -> Vec<Job<'a>
                 *values = behind;
                 (*key, piece)
             });
-            Job { first: index * ROWS_PER_JOB, columns: columns.collect(), reports }
+            Job { first: index * per_job, columns: columns.collect(), reports }
         })
         .collect()
 }
@@ -148,17 +219,18 @@ fn run<M: Model>(
     work: &mut M::Workspace,
     mut job: Job<'_>,
     control: &Control,
+    start: Start,
 ) -> Result<(), (usize, InvalidInput)> {
-    let tendons = model.robot().tendons().len();
     let rows = job.reports.len();
+    let mut before = None;
     for (i, report) in job.reports.iter_mut().enumerate() {
         if control.stop.load(Ordering::Relaxed) {
             return Ok(());
         }
         let row = job.first + i;
-        *report = model
-            .solve(&displacements[row * tendons..(row + 1) * tendons], work)
-            .map_err(|error| (row, error))?;
+        *report =
+            solve_row(model, displacements, row, before, work).map_err(|error| (row, error))?;
+        before = (start == Start::Warm).then_some(report.status);
         for (key, column) in &mut job.columns {
             let width = column.len() / rows;
             let place = &mut column[i * width..(i + 1) * width];
@@ -167,6 +239,24 @@ fn run<M: Model>(
         control.done.fetch_add(1, Ordering::Relaxed);
     }
     Ok(())
+}
+
+/// Solves a row; from the answer of the row before if that is in `work` and of use. `before` is how that
+/// row ended, none at the start of a chain.
+fn solve_row<M: Model>(
+    model: &M,
+    displacements: &[f64],
+    row: usize,
+    before: Option<Status>,
+    work: &mut M::Workspace,
+) -> Result<Report, InvalidInput> {
+    let tendons = model.robot().tendons().len();
+    let own = &displacements[row * tendons..(row + 1) * tendons];
+    let solved = match before {
+        Some(Status::Converged) => model.resume(own, work),
+        _ => model.solve(own, work),
+    };
+    solved.map_err(|error| in_row(error, row))
 }
 
 fn write_row(key: Key, place: &mut [f64], robot: &Robot, state: &State) {

@@ -5,7 +5,7 @@
 //! the whole system. A step that goes past the top of its line is shortened, and so is one after which a
 //! subsegment is no longer at a minimum: rest leads to the answer without jumps, or the way ends.
 
-use super::chain::{Chain, Left, RIDGE};
+use super::chain::{Chain, JUMP, Left, RIDGE};
 use super::plan::Plan;
 
 /// How far off balance subsegments may be where the way is easy, and where it is not.
@@ -14,7 +14,7 @@ const HARD: f64 = 1e-9;
 /// A way is not easy if it takes more steps, or if one had to be shortened.
 const EASY_STEPS: usize = 12;
 /// Evaluations that one way may take.
-const WAY: usize = 150;
+const WAY: usize = 70;
 /// Compliance of the softest tendons, in what the rod itself gives; it falls to rigid through this range, by
 /// factors from the first towards the last, which is too near 1 to go on.
 const SOFT: (f64, f64) = (1.0, 1e-7);
@@ -27,10 +27,10 @@ const LOAD: f64 = 6.0;
 const RIDGES: [f64; 6] = [1e-11, 1e-9, 1e-7, 1e-5, 1e-3, 1e-2];
 /// A slope that turns by more than this share of itself has gone past the top.
 const TURNED: f64 = 0.5;
-/// A subsegment that went further by itself in one step has jumped \[rad\].
-const JUMP: f64 = 1.0;
 /// Steps are not made shorter.
 const SHORTEST: f64 = 1e-6;
+/// Subsegments that take no more load than this are at the end of their way.
+const MARGIN: f64 = 0.02;
 
 /// How an ascent ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -187,7 +187,7 @@ impl Ascent {
                 return (Ending::Broken, left);
             }
             way.steps += 1;
-            let share = 1.0_f64.min(STEP / chain.longest()).min(LOAD / load(plan, chain));
+            let share = 1.0_f64.min(STEP / chain.longest()).min(LOAD / loads(plan, &chain.pulls));
             way.stride = Some(Stride { share, slope: chain.growth(&chain.pulls) });
             self.kept.keep(chain);
             self.pulls.clone_from(&chain.pulls);
@@ -222,7 +222,8 @@ impl Ascent {
         } else {
             0.5 * stride.share
         };
-        if share < SHORTEST {
+        let crowded = !sound && share * loads(plan, &self.pulls) < MARGIN;
+        if share < SHORTEST || crowded {
             return Verdict::Lost;
         }
         if way.balance == EASY {
@@ -257,9 +258,9 @@ enum Verdict {
     Lost,
 }
 
-/// What the step adds to the load of the slenderest subsegment.
-fn load(plan: &Plan, chain: &Chain) -> f64 {
-    chain.pulls.iter().map(|pull| pull.abs()).sum::<f64>() * plan.slenderness
+/// What changes of the tensions add to the load of the slenderest subsegment, at most.
+fn loads(plan: &Plan, pulls: &[f64]) -> f64 {
+    pulls.iter().map(|pull| pull.abs()).sum::<f64>() * plan.slenderness
 }
 
 /// The Newton step, with as little ridge as keeps dependent tendons from running away, and rounding from
@@ -267,7 +268,7 @@ fn load(plan: &Plan, chain: &Chain) -> f64 {
 fn direction(plan: &Plan, chain: &mut Chain) -> bool {
     let mut solved = chain.solve(plan, RIDGE);
     for ridge in RIDGES {
-        if solved && load(plan, chain) <= LOAD && chain.growth(&chain.pulls) > 0.0 {
+        if solved && loads(plan, &chain.pulls) <= LOAD && chain.growth(&chain.pulls) > 0.0 {
             break;
         }
         solved = chain.solve(plan, ridge);

@@ -73,6 +73,8 @@ impl Left {
 const SHIFT: f64 = 1e-3;
 /// Steps that a subsegment off balance gets at most.
 const RELAXATIONS: usize = 30;
+/// One that went further by itself has jumped \[rad\].
+pub(super) const JUMP: f64 = 1.0;
 /// Share of the Schur complement's trace that keeps dependent tendons from exploding.
 pub(super) const RIDGE: f64 = 1e-14;
 
@@ -163,7 +165,7 @@ impl Chain {
                 }
                 round += 1;
                 let far = largest > balance || (!stable && largest > 1e-9);
-                let went = if far && round <= RELAXATIONS {
+                let went = if far && round <= RELAXATIONS && moved < JUMP {
                     self.local.relax::<D>(kind, data, pieces, strains, tensions, &out)
                 } else {
                     None

@@ -11,7 +11,11 @@ pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Workspace) ->
         return String::new();
     }
     if displacements.is_empty() {
-        return "the rest shape under growing tensions ends before these are reached".to_owned();
+        let text = match work.ending {
+            Ending::Spent => "max_iterations did not suffice to reach the tensions",
+            _ => "rest leads to no stable shape under these tensions: the backbone buckles before",
+        };
+        return text.to_owned();
     }
     let over = |k: usize| {
         let stretch = plan.compliance[k] * state.tensions[k] / plan.unit;
@@ -27,7 +31,7 @@ pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Workspace) ->
         .max_by(|a, b| off(*a).total_cmp(&off(*b)))
         .unwrap_or(0);
     let opening = match work.ending {
-        Ending::Spent => "out of evaluations on the way to the displacements",
+        Ending::Spent => "max_iterations did not suffice to reach the displacements",
         Ending::Broken => "the arithmetic broke down",
         _ => "no shape near rest has these tendon lengths",
     };

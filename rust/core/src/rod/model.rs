@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::ascent::{Ascent, EASY, Ending};
-use super::chain::{Chain, Left};
+use super::chain::{Chain, JUMP, Left};
 use super::message::message;
 use super::plan::Plan;
 use super::settings::TendonRule;
@@ -40,14 +40,18 @@ pub struct Rod<'r> {
 const PATIENCE: usize = 20;
 /// Load steps are not made shorter.
 const SHORTEST: f64 = 1e-4;
-/// A subsegment that went further by itself in one load step has jumped \[rad\].
-const JUMP: f64 = 1.0;
 
 impl<'r> Rod<'r> {
     /// Solves with a plan that was made of this robot.
     #[must_use]
     pub fn new(robot: &'r Robot, plan: &'r Plan) -> Self {
         Self { robot, plan }
+    }
+
+    /// Length of every tendon at rest through this model's elements, which displacements count from \[m\].
+    #[must_use]
+    pub fn rest_lengths(&self) -> &[f64] {
+        &self.plan.rest_lengths
     }
 
     /// The shape under given tensions, in the unit of the results: displacements are then what it has. A
@@ -96,6 +100,9 @@ impl<'r> Rod<'r> {
                 work.chain.strains.clone_from(&work.reached);
                 stride = 0.5 * (next - load);
                 if budget == 0 || stride < SHORTEST {
+                    for (own, wanted) in work.chain.tensions.iter_mut().zip(tensions) {
+                        *own = load * wanted / self.plan.unit;
+                    }
                     work.ending = if budget == 0 { Ending::Spent } else { Ending::Lost };
                     work.left = work.chain.assemble(self.plan, EASY);
                     break;
@@ -157,26 +164,8 @@ impl<'r> Rod<'r> {
         for (own, tension) in work.chain.tensions.iter_mut().zip(&start.tensions) {
             *own = if tension.is_finite() { tension.max(0.0) / self.plan.unit } else { 0.0 };
         }
+        work.ending = Ending::Converged;
         self.resume(displacements, work)
-    }
-
-    /// Solves for displacements from what the last solve of this plan left in `work`.
-    ///
-    /// # Errors
-    /// As [`Model::solve`].
-    pub fn resume(
-        &self,
-        displacements: &[f64],
-        work: &mut Workspace,
-    ) -> Result<Report, InvalidInput> {
-        if work.chain.tensions.len() != displacements.len() {
-            return self.solve(displacements, work);
-        }
-        let rounds = self.ascend(displacements, work);
-        if work.ending == Ending::Converged {
-            return Ok(self.report(work, rounds));
-        }
-        self.solve(displacements, work)
     }
 
     /// From the strains and tensions at hand to the displacements; evaluations that took.
@@ -206,7 +195,7 @@ impl<'r> Rod<'r> {
     }
 
     /// Disk frames and everything else that is reported.
-    fn report(&self, work: &mut Workspace, iterations: usize) -> Report {
+    fn report(&self, work: &mut Workspace, evaluations: usize) -> Report {
         let Workspace { state, chain, .. } = work;
         let plan = self.plan;
         state.clear();
@@ -238,6 +227,8 @@ impl<'r> Rod<'r> {
             Ending::Spent => Status::IterationLimit,
             Ending::Broken => Status::NumericalError,
         };
+        // The last evaluation finds that there is no step to take.
+        let iterations = evaluations.saturating_sub(1);
         Report { status, residual: work.left.worst(), iterations }
     }
 }
@@ -253,10 +244,25 @@ impl Model for Rod<'_> {
         self.plan.unknowns()
     }
 
+    fn elements(&self) -> usize {
+        self.plan.settings.elements
+    }
+
     fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
         work.chain.rest(self.plan);
         let rounds = self.ascend(displacements, work);
         Ok(self.report(work, rounds))
+    }
+
+    fn resume(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+        let starts = work.chain.tensions.len() == displacements.len();
+        if starts && work.ending == Ending::Converged {
+            let rounds = self.ascend(displacements, work);
+            if work.ending == Ending::Converged {
+                return Ok(self.report(work, rounds));
+            }
+        }
+        self.solve(displacements, work)
     }
 
     fn state<'w>(&self, work: &'w Workspace) -> &'w State {

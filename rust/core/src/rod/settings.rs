@@ -63,7 +63,7 @@ pub struct RodSettings {
     pub elements: usize,
     /// Relative residual of forces and lengths that counts as solved.
     pub tolerance: f64,
-    /// Newton steps at most, all load steps together.
+    /// Evaluations of the whole rod at most, each of which ends in a Newton step.
     pub max_iterations: usize,
 }
 
