@@ -12,6 +12,9 @@ SOURCES := $(shell find rust python Cargo.toml Cargo.lock pyproject.toml -type f
 export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
+# Where cargo puts what it makes.
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+
 .PHONY: help demo test bench figures tools rust-checks rust-tests package python-checks python-tests runs clean
 
 help:
@@ -84,10 +87,17 @@ runs: package
 figures: $(VENV)/installed
 	for script in examples/*.py; do $(BIN)/python $$script --output examples/figures || exit 1; done
 
+# Keeps what is printed, and writes the guide's page of it. QUICK=1 is a short run: it proves that all
+# works, and its figures are rough.
+bench: SHELL := /bin/bash
+bench: .SHELLFLAGS := -o pipefail -ec
 bench: $(VENV)/installed $(VENV)/developed
-	cargo bench
-	$(BIN)/python benches/python_calls.py
-	for script in benches/peers/*.py; do $(BIN)/python $$script || exit 1; done
+	rm -rf $(TARGET)/bench && mkdir -p $(TARGET)/bench && touch $(TARGET)/bench/started
+	cargo bench --locked -- $(if $(QUICK),--warm-up-time 0.3 --measurement-time 1 --noplot)
+	$(BIN)/python benches/python_calls.py | tee $(TARGET)/bench/python_calls.txt
+	for script in benches/peers/*.py; do $(BIN)/python $$script $(if $(QUICK),--quick) \
+		| tee $(TARGET)/bench/$$(basename $$script .py).txt; done
+	$(BIN)/python benches/report.py $(TARGET) $(if $(QUICK),--quick) --output docs/benchmarks.md
 
 clean:
 	rm -rf $(VENV) dist demo target
