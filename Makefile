@@ -15,7 +15,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # Where cargo puts what it makes.
 TARGET := $(or $(CARGO_TARGET_DIR),target)
-MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 .PHONY: help demo test bench figures docs guide tools rust-checks rust-tests package python-checks python-tests runs clean
 
