@@ -2,6 +2,7 @@
 # make test   everything that CI runs
 # make bench  criterion benches and side-by-side runs against other tools
 # make figures remakes the papers' figures into examples/figures/
+# make docs   builds the guide into site/
 
 PYTHON ?= python3
 VENV := .venv
@@ -12,7 +13,11 @@ SOURCES := $(shell find rust python Cargo.toml Cargo.lock pyproject.toml -type f
 export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test bench figures tools rust-checks rust-tests package python-checks python-tests runs clean
+# Where cargo puts what it makes.
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+.PHONY: help demo test bench figures docs guide tools rust-checks rust-tests package python-checks python-tests runs clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -20,7 +25,7 @@ help:
 demo: $(VENV)/installed
 	$(BIN)/tdcr demo --output demo
 
-test: tools rust-checks rust-tests package python-checks python-tests runs
+test: tools rust-checks rust-tests package python-checks python-tests guide runs
 	@echo "all checks passed"
 
 # Says what is missing before anything starts.
@@ -42,7 +47,7 @@ $(VENV)/installed: $(VENV)/created $(SOURCES) | tools
 	@touch $@
 
 $(VENV)/developed: $(VENV)/created pyproject.toml
-	$(BIN)/pip install --quiet 'maturin>=1.14,<2' --group test --group peers
+	$(BIN)/pip install --quiet 'maturin>=1.14,<2' --group test --group peers --group docs
 	@touch $@
 
 rust-checks: tools
@@ -84,10 +89,24 @@ runs: package
 figures: $(VENV)/installed
 	for script in examples/*.py; do $(BIN)/python $$script --output examples/figures || exit 1; done
 
+# Every link, anchor, formula and docstring must hold: a warning is an error.
+docs: $(VENV)/installed $(VENV)/developed
+	$(MKDOCS)
+
+guide: package
+	$(MKDOCS)
+
+# Keeps what is printed, and writes the guide's page of it. QUICK=1 is a short run: it proves that all
+# works, and its figures are rough.
+bench: SHELL := /bin/bash
+bench: .SHELLFLAGS := -o pipefail -ec
 bench: $(VENV)/installed $(VENV)/developed
-	cargo bench
-	$(BIN)/python benches/python_calls.py
-	for script in benches/peers/*.py; do $(BIN)/python $$script || exit 1; done
+	rm -rf $(TARGET)/bench && mkdir -p $(TARGET)/bench && touch $(TARGET)/bench/started
+	cargo bench --locked -- $(if $(QUICK),--warm-up-time 0.3 --measurement-time 1 --noplot)
+	$(BIN)/python benches/python_calls.py | tee $(TARGET)/bench/python_calls.txt
+	for script in benches/peers/*.py; do $(BIN)/python $$script $(if $(QUICK),--quick) \
+		| tee $(TARGET)/bench/$$(basename $$script .py).txt; done
+	$(BIN)/python benches/report.py $(TARGET) $(if $(QUICK),--quick) --output docs/benchmarks.md
 
 clean:
-	rm -rf $(VENV) dist demo target
+	rm -rf $(VENV) dist demo site target

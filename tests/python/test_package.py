@@ -1,4 +1,4 @@
-"""The installed package: docs, types, lazy imports, examples in docstrings and in the README."""
+"""The installed package: docs, types, lazy imports; examples in docstrings."""
 
 import doctest
 import inspect
@@ -59,15 +59,6 @@ def test_docstrings_carry_units_shapes_and_errors():
 def test_doctests_run():
     assert doctest.testmod(tdcr).failed == 0
     assert doctest.testmod(tdcr).attempted > 0
-
-
-@pytest.mark.parametrize("page", ["README.md", "docs/rod.md"])
-def test_the_pages_code_runs(page, tmp_path, monkeypatch):
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)
-    assert blocks
-    monkeypatch.chdir(tmp_path)
-    for block in blocks:
-        exec(block, {})
 
 
 def test_statuses_are_those_of_the_core():

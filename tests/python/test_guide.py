@@ -1,0 +1,82 @@
+"""The guide and the README: their code runs, their screens are real, the reference is complete.
+
+The blocks of a page run in order and share names and a folder; those of the README stand alone.
+A block with a file name as its title is written to that file first, `text title="prints"` is what
+the block before it prints, and `console` holds commands with what they print.
+"""
+
+import contextlib
+import io
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tdcr
+
+ROOT = Path(__file__).resolve().parents[2]
+FENCE = re.compile(r"^```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+CODED = [
+    page
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    if re.search(r"```(python|console)", page.read_text(encoding="utf-8"))
+]
+
+
+def lines(text):
+    return [line.rstrip() for line in text.strip().splitlines()]
+
+
+def run_commands(block):
+    """Every command of a block, and what it must print."""
+    for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+        command, expected = part.split("\n", 1)
+        program, *arguments = shlex.split(command)
+        assert program == "tdcr"
+        done = subprocess.run(
+            [sys.executable, "-m", "tdcr", *arguments], capture_output=True, text=True, check=False
+        )
+        assert lines(done.stdout + done.stderr) == lines(expected), command
+
+
+@pytest.mark.parametrize("page", CODED, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
+    text = page.read_text(encoding="utf-8")
+    fences = FENCE.findall(text)
+    # None is hidden from the pattern, by indentation say.
+    assert len(fences) == len(re.findall(r"^\s*```\w", text, re.MULTILINE))
+    monkeypatch.chdir(tmp_path)
+    names, printed = {}, None
+    for language, title, block in fences:
+        if title == "prints":
+            assert printed is not None
+            assert lines(printed) == lines(block)
+        elif title:
+            Path(title).write_text(block, encoding="utf-8")
+        elif language == "console":
+            run_commands(block)
+        elif language == "python":
+            if page.name == "README.md":
+                names = {}
+            with contextlib.redirect_stdout(io.StringIO()) as out:
+                exec(compile(block, page.name, "exec"), names)
+            printed = out.getvalue()
+
+
+def test_the_reference_names_everything_public():
+    reference = "\n".join(page.read_text() for page in (ROOT / "docs/reference").glob("*.md"))
+    named = set(re.findall(r"^::: tdcr\.(\w+)$", reference, re.MULTILINE))
+    # A module comes with all it exports.
+    with_modules = {
+        name for module in named for name in getattr(getattr(tdcr, module), "__all__", ())
+    }
+    assert named <= set(tdcr.__all__) <= named | with_modules
+
+
+def test_every_page_is_in_the_navigation():
+    navigation = (ROOT / "mkdocs.yml").read_text()
+    for page in (ROOT / "docs").rglob("*.md"):
+        assert f" {page.relative_to(ROOT / 'docs').as_posix()}\n" in navigation
