@@ -31,6 +31,7 @@ mod robot;
 mod rod_golden;
 mod rod_sensitivity;
 mod solve;
+mod solve_bounded;
 mod solve_quadratic;
 
 /// Every file beside this one is a module of this target: a forgotten one would never run.

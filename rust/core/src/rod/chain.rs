@@ -8,7 +8,8 @@
 use super::plan::Plan;
 use super::subsegment::{Derivatives, Local, ROUNDING};
 use crate::lie::Pose;
-use crate::solve::quadratic::{Outcome, Quadratic, Rows, backward, cholesky, dot, forward};
+use crate::solve::bounded::Bounded;
+use crate::solve::quadratic::{backward, cholesky, dot, forward};
 
 /// Unknowns and the buffers of a Newton step.
 #[derive(Clone, Debug, Default)]
@@ -43,8 +44,9 @@ pub(super) struct Chain {
     /// `Σ A H⁻¹ Aᵀ` and the tendons' compliance.
     pub(super) schur: Vec<f64>,
     reduced: Vec<f64>,
-    program: Quadratic,
-    rows: Rows,
+    right: Vec<f64>,
+    least: Vec<f64>,
+    program: Bounded,
     whole: Vec<f64>,
 }
 
@@ -269,32 +271,27 @@ impl Chain {
         let trace: f64 = (0..tendons).filter(bounded).map(|k| self.schur[k * (tendons + 1)]).sum();
         let ridge = ridge * trace + f64::MIN_POSITIVE;
         self.reduced.clear();
-        self.program.gradient.clear();
-        self.rows.clear();
+        self.right.clear();
+        self.least.clear();
         for k in (0..tendons).filter(bounded) {
             for l in (0..=k).filter(bounded) {
                 self.reduced.push(self.schur[k * tendons + l]);
             }
-            let a = self.program.gradient.len();
             if let Some(diagonal) = self.reduced.last_mut() {
                 *diagonal += ridge;
             }
-            self.reduced.resize((a + 1) * count, 0.0);
-            self.program.gradient.push(-self.slope[k]);
-            if !plan.signed {
-                self.rows.push(count, self.tensions[k])[a] = -1.0;
-            }
+            self.right.push(self.slope[k]);
+            self.reduced.resize(self.right.len() * count, 0.0);
+            let least = if plan.signed { f64::NEG_INFINITY } else { -self.tensions[k] };
+            self.least.push(least);
         }
-        if !(self.program.factor(&self.reduced, count)
-            && self.program.solve(&self.rows) == Outcome::Solved)
-        {
+        let Self { program, reduced, right, least, .. } = self;
+        if !program.solve(reduced, right, least, |k| least[k] < 0.0) {
             return false;
         }
-        for (a, k) in (0..tendons).filter(bounded).enumerate() {
-            // Exactly slack, not nearly.
-            let slack = self.program.active.contains(&a);
-            let least = if plan.signed { f64::NEG_INFINITY } else { -self.tensions[k] };
-            self.pulls[k] = if slack { least } else { self.program.step[a].max(least) };
+        let steps = program.step.iter();
+        for (k, step) in (0..tendons).filter(|k| self.bounds[*k].is_finite()).zip(steps) {
+            self.pulls[k] = *step;
         }
         true
     }

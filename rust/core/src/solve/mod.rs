@@ -1,5 +1,6 @@
 //! Solvers: they see functions, gradients and block structure, never robots.
 
+pub mod bounded;
 pub mod fit;
 mod least;
 pub mod least_squares;
