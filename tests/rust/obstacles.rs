@@ -134,7 +134,8 @@ proptest! {
         // What is out of reach is left out.
         faces.clear();
         lumen.constraints(&x, 0.01, &mut faces).unwrap();
-        prop_assert!(!faces.is_empty() && faces.iter().all(|f| f.distance <= depth.abs() + 0.01));
+        let most = depth.max(0.01 - depth.min(0.0));
+        prop_assert!(!faces.is_empty() && faces.iter().all(|f| f.distance <= most));
     }
 }
 

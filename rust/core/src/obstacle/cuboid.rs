@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Near, moved, tightest_first};
+use super::{Near, moved, tightest_first, within};
 use crate::error::{self, InvalidInput, finite_vector, length};
 use crate::lie::Pose;
 
@@ -99,9 +99,10 @@ impl Cuboid {
         Near::round(&from, &across, 0.0, from).rotated(&self.pose.rotation).of(code(side))
     }
 
-    /// Every face of the lumen within reach: the inside is their intersection.
+    /// Every face of the lumen within reach, or the nearest: the inside is their intersection.
     pub(super) fn lumen(&self, x: &Vector3<f64>, reach: f64, out: &mut Vec<Near>) {
-        let within = self.near(x).distance.abs() + reach;
+        let nearest = self.near(x).flipped(true);
+        let within = within(nearest.distance, reach);
         let x = self.local(x);
         let start = out.len();
         for axis in 0..3 {
@@ -111,6 +112,9 @@ impl Cuboid {
                     out.push(face);
                 }
             }
+        }
+        if out.len() == start {
+            out.push(nearest);
         }
         tightest_first(&mut out[start..]);
     }

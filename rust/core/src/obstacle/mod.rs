@@ -169,13 +169,14 @@ impl Obstacle {
         Ok(near.flipped(self.inside))
     }
 
-    /// Appends the conditions that together say, near `x`, that a point is where it may be: those within
-    /// `reach` \[m\] beyond the nearest place, tightest first, at least one.
+    /// Appends the conditions that together say, near `x`, that a point is where it may be: all that a
+    /// step of up to `reach` \[m\] can meet, and the nearest in any case; tightest first. A body around
+    /// the point adds its radius to the reach.
     ///
     /// One for a smooth volume; for a box or a mesh one for every face, edge or vertex that is a nearest
     /// place of its neighbourhood, or meets such a one in a hollow of the obstacle. They hold together
     /// (and), never in the alternative; where `x` has sunk into the obstacle the nearest way out is
-    /// taken.
+    /// taken, and the reach counts from there.
     ///
     /// # Errors
     /// A [`SignedDistance`] that failed; no other volume can. `out` is then as it was.
@@ -222,7 +223,12 @@ hash_by_bits!(Obstacle, |obstacle, bits| {
     }
 });
 
-/// Adds what equal values share but their order: kept apart so that tests see ties broken alike.
+/// How far from a point places count.
+fn within(distance: f64, reach: f64) -> f64 {
+    reach - distance.min(0.0)
+}
+
+/// In the order of their distances, and of their places among equals.
 fn tightest_first(entries: &mut [Near]) {
     entries
         .sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance).then(a.feature.cmp(&b.feature)));

@@ -6,10 +6,11 @@ use parry3d_f64::partitioning::{BvhLeafCost, BvhNode};
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::TrianglePointLocation;
 
-use super::super::Near;
+use super::super::{Near, within};
 use super::surface::{Corner, Edge, Fold, Surface, from_parry, to_parry};
 
-/// Share of the surface's size below which the way from an edge or a vertex is rounding, not a direction.
+/// Share of the surface's size below which the way from an edge or a vertex is rounding, not a direction,
+/// and of a triangle's height below which a point lies on its edge.
 const TOUCH: f64 = 1e-14;
 
 /// A part of the surface.
@@ -64,7 +65,10 @@ impl Surface {
         } else {
             out.push(first);
         }
-        let within = first.distance.abs() + reach;
+        let within = within(first.distance, reach);
+        if first.distance > within {
+            return;
+        }
         let mut hollows = false;
         for hit in self.around(x, within) {
             if self.is_hollow(hit.place, inside) {
@@ -132,12 +136,32 @@ impl Surface {
     fn hit(&self, face: usize, p: Vector) -> Hit {
         let triangle = &self.triangles[face];
         let (projection, location) = triangle.project_local_point_and_get_location(p, false);
-        let place = match location {
-            TrianglePointLocation::OnVertex(k) => Place::Vertex(self.faces[face][k as usize]),
-            TrianglePointLocation::OnEdge(k, _) => Place::Edge(self.face_edges[face][k as usize]),
-            _ => Place::Face,
-        };
+        let place = self.place(face, location);
         Hit { face, place, squared: (p - projection.point).length_squared() }
+    }
+
+    /// The part of the surface that a triangle's point lies on: its edges and vertices take what rounding
+    /// cannot tell from them, so that the triangles that share them agree.
+    fn place(&self, face: usize, location: TrianglePointLocation) -> Place {
+        let weights = match location {
+            TrianglePointLocation::OnVertex(k) => {
+                return Place::Vertex(self.faces[face][k as usize]);
+            }
+            TrianglePointLocation::OnEdge(0, [a, b]) => [a, b, 0.0],
+            TrianglePointLocation::OnEdge(1, [b, c]) => [0.0, b, c],
+            TrianglePointLocation::OnEdge(_, [a, c]) => [a, 0.0, c],
+            TrianglePointLocation::OnFace(_, weights) => weights,
+            TrianglePointLocation::OnSolid => return Place::Face,
+        };
+        let mut clear = (0..3).filter(|k| weights[*k] > TOUCH);
+        match (clear.next(), clear.next(), clear.next()) {
+            (Some(_), Some(_), Some(_)) => Place::Face,
+            // Edges are ab, bc, ca.
+            (Some(0), Some(2), None) => Place::Edge(self.face_edges[face][2]),
+            (Some(k), Some(_), None) => Place::Edge(self.face_edges[face][k]),
+            (Some(k), ..) => Place::Vertex(self.faces[face][k]),
+            (None, ..) => Place::Face,
+        }
     }
 
     /// The faces that meet in a place.
