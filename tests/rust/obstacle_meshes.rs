@@ -49,7 +49,9 @@ fn cube_parts() -> (Vec<V>, Faces) {
     let [a, b, c] = HALF;
     let (mut vertices, faces) =
         prism(&[(-a, -b), (a, -b), (a, b), (-a, b)], &[[0, 1, 2], [0, 2, 3]], 2.0 * c);
-    vertices.iter_mut().for_each(|vertex| vertex.z -= c);
+    for vertex in &mut vertices {
+        vertex.z -= c;
+    }
     (vertices, faces)
 }
 

@@ -155,12 +155,11 @@ impl Surface {
         };
         let mut clear = (0..3).filter(|k| weights[*k] > TOUCH);
         match (clear.next(), clear.next(), clear.next()) {
-            (Some(_), Some(_), Some(_)) => Place::Face,
             // Edges are ab, bc, ca.
             (Some(0), Some(2), None) => Place::Edge(self.face_edges[face][2]),
             (Some(k), Some(_), None) => Place::Edge(self.face_edges[face][k]),
-            (Some(k), ..) => Place::Vertex(self.faces[face][k]),
-            (None, ..) => Place::Face,
+            (Some(k), None, _) => Place::Vertex(self.faces[face][k]),
+            _ => Place::Face,
         }
     }
 
