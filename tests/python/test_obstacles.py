@@ -335,3 +335,49 @@ def test_without_trimesh_the_extra_is_named(tmp_path):
     run = [sys.executable, "-c", code]
     done = subprocess.run(run, capture_output=True, text=True, check=True, cwd=tmp_path)
     assert done.stdout.strip().endswith("pip install tdcr[mesh]")
+
+
+def ring(n, m):
+    """Return vertices and faces of a torus of radii 0.05 and 0.02: hollows, ridges and saddles."""
+    around = np.linspace(0, 2 * np.pi, n, endpoint=False)[:, None]
+    about = np.linspace(0, 2 * np.pi, m, endpoint=False)[None, :]
+    r = 0.05 + 0.02 * np.cos(about)
+    grid = [r * np.cos(around), r * np.sin(around), 0.02 * np.sin(about) + 0 * around]
+    i, j = (index.ravel() for index in np.indices((n, m)))
+    i1, j1 = (i + 1) % n, (j + 1) % m
+    a, b, c, d = i * m + j, i1 * m + j, i1 * m + j1, i * m + j1
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return np.stack(grid, -1).reshape(-1, 3), faces
+
+
+def by_brute_force(x, vertices, faces):
+    """Return the distance to all triangles' least, negative where their solid angles surround x."""
+    a, b, c = (vertices[faces[:, k]] - x for k in range(3))
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dot = [np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a))]
+    angles = 2 * np.arctan2(triple, la * lb * lc + dot[0] * lc + dot[1] * la + dot[2] * lb)
+    distances = [la, lb, lc]
+    for u, v in ((a, b), (b, c), (c, a)):
+        edge = v - u
+        t = -np.einsum("ij,ij->i", u, edge) / np.einsum("ij,ij->i", edge, edge)
+        distances.append(np.linalg.norm(u + np.clip(t, 0, 1)[:, None] * edge, axis=1))
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    height = np.einsum("ij,ij->i", a, normal)
+    foot = height[:, None] * normal
+    sides = [
+        np.einsum("ij,ij->i", np.cross(v - u, foot - u), normal)
+        for u, v in ((a, b), (b, c), (c, a))
+    ]
+    distances.append(np.where(np.min(sides, axis=0) >= 0, np.abs(height), np.inf))
+    return np.min(distances) * (-1 if angles.sum() > 2 * np.pi else 1)
+
+
+def test_a_ring_against_every_triangle_and_solid_angles():
+    vertices, faces = ring(25, 13)
+    mesh = tdcr.Mesh(vertices, faces)
+    points = np.random.default_rng(1).uniform(-0.08, 0.08, (400, 3)) * [1, 1, 0.4]
+    want = [by_brute_force(x, vertices, faces) for x in points]
+    assert 40 < np.sum(np.array(want) < 0) < 360
+    np.testing.assert_allclose(mesh.distance(points), want, atol=1e-15)
