@@ -190,6 +190,21 @@ proptest! {
         prop_assert!(error < 1.01 * step.norm_squared() / d, "{x:?} {d} {error:e} {entries:?}");
     }
 
+    /// Of a shape with right angles the planes a point has sunk behind lead it out, each by its own depth.
+    #[test]
+    fn sunk_points_are_led_to_the_surface(x in point(4.0), inside: bool) {
+        let obstacle = l_shape(inside);
+        let near = nearest(&obstacle, &x);
+        if near.distance >= 0.0 {
+            return Ok(());
+        }
+        let entries = constraints(&obstacle, &x, 0.3);
+        let behind = entries.iter().filter(|e| e.distance < 0.0);
+        let out = behind.fold(x, |out, e| out - e.gradient * e.distance);
+        prop_assert!(((out - x).norm() + near.distance).abs() < 1e-14, "{x:?} {entries:?}");
+        prop_assert!(nearest(&obstacle, &out).distance.abs() < 1e-14, "{x:?} {entries:?}");
+    }
+
     /// On a ring's saddles, too, nobody is told to stay out of free space.
     #[test]
     fn on_a_ring_they_hold_wherever_there_is_room(x in point(1.6), inside: bool, step in point(0.1)) {

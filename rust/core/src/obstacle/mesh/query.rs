@@ -97,6 +97,7 @@ impl Surface {
     ) {
         let known = out.len();
         let least = out[start..].iter().fold(f64::INFINITY, |least, e| least.min(e.distance));
+        let least = least.max(0.0);
         for hit in self.around(x, within) {
             if !self.is_hollow(hit.place, inside) {
                 continue;
@@ -106,7 +107,8 @@ impl Surface {
                 out[start..known].iter().any(|entry| entry.feature as usize == plane)
             });
             let entry = self.plane(hit.face, x).flipped(inside);
-            // A plane that x is farther behind than it is in the solid does not bound the space here.
+            // A plane nearer than the surface cuts through free space, and one that x is behind may be
+            // the alternative to another, on the far side of a ridge.
             if meets && entry.distance >= least {
                 push(out, start, entry);
             }

@@ -93,18 +93,7 @@ impl Surface {
                 (corner(face, 1) - a).cross(&(corner(face, 2) - a)).normalize()
             })
             .collect();
-        let mut vertex_normals = vec![Vector3::zeros(); vertices.len()];
-        for (face, normal) in faces.iter().zip(&normals) {
-            for k in 0..3 {
-                let (u, v) =
-                    (corner(face, k + 1) - corner(face, k), corner(face, k + 2) - corner(face, k));
-                vertex_normals[face[k]] += normal * u.cross(&v).norm().atan2(u.dot(&v));
-            }
-        }
-        for normal in &mut vertex_normals {
-            // Zero only where no face is, which is never asked.
-            *normal = normal.try_normalize(0.0).unwrap_or_default();
-        }
+        let vertex_normals = vertex_normals(&vertices, &faces, &normals);
         let edges: Vec<Edge> = edges
             .iter()
             .map(|(ends, sides)| edge(&vertices, &faces, &normals, *ends, *sides))
@@ -163,6 +152,23 @@ impl Surface {
             (Some(_), None) => Corner::Vertex,
         }
     }
+}
+
+fn vertex_normals(
+    vertices: &[Vector3<f64>],
+    faces: &[[usize; 3]],
+    normals: &[Vector3<f64>],
+) -> Vec<Vector3<f64>> {
+    let mut sums = vec![Vector3::zeros(); vertices.len()];
+    for (face, normal) in faces.iter().zip(normals) {
+        for k in 0..3 {
+            let at = vertices[face[k]];
+            let (u, v) = (vertices[face[(k + 1) % 3]] - at, vertices[face[(k + 2) % 3]] - at);
+            sums[face[k]] += normal * u.cross(&v).norm().atan2(u.dot(&v));
+        }
+    }
+    // Zero only where no face is, which is never asked.
+    sums.iter().map(|sum| sum.try_normalize(0.0).unwrap_or_default()).collect()
 }
 
 fn edge(
