@@ -1,22 +1,31 @@
 from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
-from typing import Any, Self, TypeAlias, final
+from typing import Any, Literal, Self, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import disjoint_base
 
 from tdcr._status import Status
 
 __all__ = [
     "Backbone",
     "Bounds",
+    "Box",
+    "Capsule",
     "ConstantCurvatureSettings",
+    "Cylinder",
+    "HalfSpace",
     "InverseSettings",
     "LinkageSettings",
+    "Mesh",
+    "Obstacle",
     "PsoSettings",
     "Robot",
     "RodSettings",
     "Shape",
+    "SignedDistance",
+    "Sphere",
     "Tendon",
     "__version__",
     "_angle_at",
@@ -51,6 +60,7 @@ __all__ = [
     "_two_section_batch",
     "_two_section_nearest",
     "_two_section_solutions",
+    "clearance",
     "forward",
     "jacobian",
 ]
@@ -164,6 +174,143 @@ class Tendon:
     def __ne__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, ...]: ...
+
+@disjoint_base
+class Obstacle:
+    @property
+    def inside(self) -> bool: ...
+    def distance(self, points: ArrayLike) -> _Array: ...
+    def gradient(self, points: ArrayLike) -> _Array: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Sphere(Obstacle):
+    def __new__(
+        cls,
+        center: ArrayLike,
+        radius: float,
+        *,
+        inside: bool = False,
+    ) -> Self: ...
+    @property
+    def center(self) -> _Array: ...
+    @property
+    def radius(self) -> float: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class Cylinder(Obstacle):
+    def __new__(
+        cls,
+        point: ArrayLike,
+        axis: ArrayLike,
+        radius: float,
+        *,
+        inside: bool = False,
+    ) -> Self: ...
+    @property
+    def point(self) -> _Array: ...
+    @property
+    def axis(self) -> _Array: ...
+    @property
+    def radius(self) -> float: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class HalfSpace(Obstacle):
+    def __new__(
+        cls,
+        point: ArrayLike,
+        normal: ArrayLike,
+        *,
+        inside: bool = False,
+    ) -> Self: ...
+    @property
+    def point(self) -> _Array: ...
+    @property
+    def normal(self) -> _Array: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class Capsule(Obstacle):
+    def __new__(
+        cls,
+        a: ArrayLike,
+        b: ArrayLike,
+        radius: float,
+        *,
+        inside: bool = False,
+    ) -> Self: ...
+    @property
+    def a(self) -> _Array: ...
+    @property
+    def b(self) -> _Array: ...
+    @property
+    def radius(self) -> float: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class Box(Obstacle):
+    def __new__(
+        cls,
+        center: ArrayLike,
+        half_extents: ArrayLike,
+        rotation: ArrayLike | None = None,
+        *,
+        inside: bool = False,
+    ) -> Self: ...
+    @property
+    def center(self) -> _Array: ...
+    @property
+    def half_extents(self) -> _Array: ...
+    @property
+    def rotation(self) -> _Array: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class Mesh(Obstacle):
+    def __new__(
+        cls,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        inside: bool = False,
+    ) -> Self: ...
+    @classmethod
+    def load(
+        cls,
+        path: str | PathLike[str],
+        *,
+        unit: Literal["m", "cm", "mm", "um", "in"],
+        inside: bool = False,
+    ) -> Mesh: ...
+    @property
+    def vertices(self) -> _Array: ...
+    @property
+    def faces(self) -> NDArray[np.int64]: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class SignedDistance(Obstacle):
+    def __new__(
+        cls,
+        f: Callable[[_Array], float],
+        gradient: Callable[[_Array], ArrayLike] | None = None,
+        *,
+        inside: bool = False,
+    ) -> Self: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    @property
+    def f(self) -> Callable[[_Array], float]: ...
+    @property
+    def gradient_function(self) -> Callable[[_Array], ArrayLike] | None: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+def clearance(obstacles: Obstacle | Iterable[Obstacle], points: ArrayLike) -> _Array: ...
 
 @final
 class Robot:

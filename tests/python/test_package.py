@@ -23,7 +23,7 @@ def test_it_is_the_installed_wheel_that_is_tested():
 
 
 def test_importing_is_light():
-    heavy = ("matplotlib", "pydantic", "rich", "click", "scipy")
+    heavy = ("matplotlib", "pydantic", "rich", "click", "scipy", "trimesh")
     code = f"import sys, tdcr; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

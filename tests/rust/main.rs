@@ -19,6 +19,8 @@ mod linkage_bars;
 mod linkage_chain;
 mod linkage_drive;
 mod linkage_random;
+mod obstacle_meshes;
+mod obstacles;
 mod optimality;
 mod planar_inverse;
 mod planar_obstacles;

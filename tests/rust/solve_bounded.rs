@@ -11,9 +11,9 @@ fn answers_meet_the_conditions_of_optimality() {
     let mut solver = Bounded::default();
     let mut at_bounds = 0;
     for case in 0..2000 {
-        let size = draw.random_range(1..10);
+        let size = draw.random_range(1..10_usize);
         // Some matrices have directions that cost nothing, and right-hand sides that do not pull there.
-        let rank = if case % 3 == 0 { (size + 1) / 2 } else { size + 2 };
+        let rank = if case % 3 == 0 { size.div_ceil(2) } else { size + 2 };
         let rows = DMatrix::from_fn(rank, size, |_, _| draw.random_range(-1.0..1.0));
         let ridge = DMatrix::identity(size, size) * 1e-14;
         let matrix = rows.transpose() * &rows + ridge;

@@ -2,6 +2,8 @@
 
 use std::fmt::Display;
 
+use nalgebra::{Matrix3, Vector3};
+
 /// An argument that cannot be used, with what was expected and what came.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{argument}: expected {expected}, got {got}")]
@@ -71,4 +73,66 @@ pub(crate) fn positive(argument: &str, unit: &str, value: f64) -> Result<f64, In
             format!("{value:?}"),
         ))
     }
+}
+
+/// Three finite numbers, without negative zeros.
+///
+/// # Errors
+/// `InvalidInput` when one of them is NaN or infinite.
+pub(crate) fn finite_vector(
+    argument: &str,
+    unit: &str,
+    value: &Vector3<f64>,
+) -> Result<Vector3<f64>, InvalidInput> {
+    if value.iter().all(|component| component.is_finite()) {
+        Ok(value.map(|component| component + 0.0))
+    } else {
+        let got = format!("({:?}, {:?}, {:?})", value.x, value.y, value.z);
+        Err(InvalidInput::new(argument, format!("three finite numbers [{unit}]"), got))
+    }
+}
+
+/// A vector of any length as a unit vector; one that already is stays as it is to the bit.
+///
+/// # Errors
+/// `InvalidInput` when it is zero or not finite.
+pub(crate) fn direction(
+    argument: &str,
+    value: &Vector3<f64>,
+) -> Result<Vector3<f64>, InvalidInput> {
+    let value = finite_vector(argument, "1", value)?;
+    let largest = value.amax();
+    if largest == 0.0 {
+        return Err(InvalidInput::new(argument, "a direction, not zero", "(0, 0, 0)"));
+    }
+    if (value.norm() - 1.0).abs() <= 4.0 * f64::EPSILON {
+        return Ok(value);
+    }
+    // Scaled first: the squares of 1e-200 or 1e200 are not numbers one can work with.
+    let scaled = value / largest;
+    Ok(scaled / scaled.norm())
+}
+
+/// How far a rotation matrix may be from orthonormal: the rounding of hand-typed 1e-10 digits.
+const RIGID_TOLERANCE: f64 = 1e-9;
+
+/// Checks that a matrix is a rotation; gives back how far it is from orthonormal.
+///
+/// # Errors
+/// `InvalidInput`, which says that `what` was expected, when it is not.
+pub(crate) fn rotation(
+    argument: &str,
+    what: &str,
+    matrix: &Matrix3<f64>,
+) -> Result<f64, InvalidInput> {
+    let error = (matrix.transpose() * matrix - Matrix3::identity()).amax();
+    let got = if error.is_nan() || error > RIGID_TOLERANCE {
+        format!("R^T R off by {error:.1e}")
+    } else if matrix.determinant() < 0.0 {
+        "a reflection (determinant -1)".to_owned()
+    } else {
+        return Ok(error);
+    };
+    let expected = format!("{what} (R^T R = I to {RIGID_TOLERANCE:e})");
+    Err(InvalidInput::new(argument, expected, got))
 }

@@ -4,8 +4,8 @@
 //! SI (m, rad, N, Pa); frames, signs and words are those of the user guide in `docs/`.
 //!
 //! Rooms, from the bottom up: [`lie`] (rotations and rigid motions), [`solve`] (solvers that know no
-//! robots), [`robot`] (what a robot is), [`model`] (what every forward model offers), [`linkage`]
-//! (the linkage model), [`constant_curvature`], [`rod`] (the strain-energy rod), [`planar`] (planar
+//! robots), [`robot`] (what a robot is), [`obstacle`] (what it must stay out of), [`model`] (what every
+//! forward model offers), [`linkage`] (the linkage model), [`constant_curvature`], [`rod`] (the strain-energy rod), [`planar`] (planar
 //! trunks), [`batch`] (many solves on all cores), [`inverse`] (from targets to displacements).
 //!
 //! ```
@@ -28,12 +28,14 @@
 #![forbid(unsafe_code)]
 
 pub mod batch;
+mod bits;
 pub mod constant_curvature;
 pub mod error;
 pub mod inverse;
 pub mod lie;
 pub mod linkage;
 pub mod model;
+pub mod obstacle;
 pub mod planar;
 pub mod robot;
 pub mod rod;

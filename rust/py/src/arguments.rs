@@ -1,15 +1,16 @@
 //! Arguments that are numbers, counts and names: a wrong type is a `TypeError` that names the argument,
 //! a number that cannot be used is `InvalidInput`.
 
+use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyByteArray, PyBytes, PyDict, PyFrozenSet, PySet, PyString};
+use pyo3::types::{PyBool, PyByteArray, PyBytes, PyDict, PyFloat, PyFrozenSet, PySet, PyString};
 
 use tdcr::InvalidInput;
 
-use crate::convert::{invalid, type_name};
+use crate::convert::{invalid, type_name, wrong_shape};
 
-fn wrong_type(argument: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
+pub(crate) fn wrong_type(argument: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
     PyTypeError::new_err(format!("{argument}: expected {expected}, got {}", type_name(value)))
 }
 
@@ -30,6 +31,19 @@ pub(crate) fn number(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> 
         }
         wrong()
     })
+}
+
+/// What a function returned for one point, as a number.
+pub(crate) fn returned(argument: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    if let Ok(value) = value.cast::<PyFloat>() {
+        return Ok(value.value());
+    }
+    if let Ok(array) = value.cast::<PyUntypedArray>()
+        && array.ndim() != 0
+    {
+        return Err(wrong_shape(argument, expected, array.shape()));
+    }
+    number(argument, value)
 }
 
 /// A whole number of 0 or more.

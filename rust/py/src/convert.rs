@@ -1,6 +1,6 @@
 //! Between Python values and the core's.
 
-use nalgebra::{Matrix4, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3};
 use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyTypeError;
@@ -128,6 +128,24 @@ pub(crate) fn matrix4(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Matr
     Ok(Matrix4::from_row_slice(values(&array)?))
 }
 
+/// A matrix of three rows and columns.
+pub(crate) fn matrix3(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Matrix3<f64>> {
+    let array = float_array(argument, value)?;
+    if array.shape() != [3, 3] {
+        return Err(wrong_shape(argument, "a matrix of shape (3, 3)", array.shape()));
+    }
+    Ok(Matrix3::from_row_slice(values(&array)?))
+}
+
+/// Three numbers.
+pub(crate) fn vector(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vector3<f64>> {
+    let array = float_array(argument, value)?;
+    if array.shape() != [3] {
+        return Err(wrong_shape(argument, "three numbers, shape (3,)", array.shape()));
+    }
+    Ok(Vector3::from_column_slice(values(&array)?))
+}
+
 /// Rows of three numbers.
 pub(crate) fn vectors(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Vector3<f64>>> {
     let array = float_array(argument, value)?;
@@ -146,6 +164,11 @@ pub(crate) fn frozen<T: Element>(
     let array = PyArray::from_vec(py, values).reshape(shape.to_vec())?;
     array.call_method1("setflags", (false,))?;
     Ok(array.into_any().unbind())
+}
+
+/// Three numbers as a read-only array.
+pub(crate) fn frozen_vector(py: Python<'_>, vector: Vector3<f64>) -> PyResult<Py<PyAny>> {
+    frozen(py, vector.as_slice().to_vec(), &[3])
 }
 
 /// Points as a read-only (m, 3) array.

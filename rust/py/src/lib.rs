@@ -15,6 +15,8 @@ mod convert;
 mod forward;
 mod inverse;
 mod long_call;
+mod mesh;
+mod obstacle;
 mod planar;
 mod planar_inverse;
 mod pso;
@@ -23,7 +25,9 @@ mod robot;
 mod rod;
 mod settings;
 mod shape;
+mod signed_distance;
 mod tendon;
+mod volumes;
 
 /// The compiled core; use the package `tdcr`.
 #[pyo3::pymodule]
@@ -42,6 +46,10 @@ mod _core {
     use crate::forward::{_fields, _forward_batch, forward, jacobian};
     #[pymodule_export]
     use crate::inverse::{_inverse, _inverse_batch, _inverse_solutions};
+    #[pymodule_export]
+    use crate::mesh::Mesh;
+    #[pymodule_export]
+    use crate::obstacle::{Obstacle, clearance};
     #[pymodule_export]
     use crate::planar::{
         _angle_at, _angle_coefficients, _angle_curve, _planar_cable_lengths, _planar_curve,
@@ -68,7 +76,11 @@ mod _core {
     #[pymodule_export]
     use crate::shape::{_rotation_vector, _shape, Shape};
     #[pymodule_export]
+    use crate::signed_distance::SignedDistance;
+    #[pymodule_export]
     use crate::tendon::{_tendon, Tendon};
+    #[pymodule_export]
+    use crate::volumes::{Capsule, Cuboid, Cylinder, HalfSpace, Sphere};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use numpy::{PyArray1, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyFloat, PyTuple};
+use pyo3::types::PyTuple;
 
 use tdcr::solve::pso::{Objective, Progress, Swarm};
 
-use crate::arguments::number;
+use crate::arguments::returned;
 use crate::convert::{float_array, frozen, invalid, status, values, wrong_shape};
 use crate::pso_settings::PsoSettings;
 
@@ -29,16 +29,8 @@ impl Function<'_, '_> {
         let py = self.f.py();
         // A new array every time: the function may keep it.
         let value = self.f.call1((PyArray1::from_slice(py, point),))?;
-        if let Ok(value) = value.cast::<PyFloat>() {
-            return Ok(value.value());
-        }
-        if let Ok(array) = value.cast::<PyUntypedArray>()
-            && array.ndim() != 0
-        {
-            let expected = "one number for a point (vectorized=True takes all points at once)";
-            return Err(wrong_shape("f", expected, array.shape()));
-        }
-        number("f", &value)
+        let expected = "one number for a point (vectorized=True takes all points at once)";
+        returned("f", expected, &value)
     }
 
     fn all(&self, points: &[f64], dimensions: usize, values_out: &mut [f64]) -> PyResult<()> {

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
-use super::bits::{Bits, hash_by_bits};
 use super::curve::rest_from_curve;
+use crate::bits::{Bits, hash_by_bits};
 use crate::error::{InvalidInput, finite, positive};
 
 /// What a backbone is described by, before it is checked. See [`Backbone::new`].

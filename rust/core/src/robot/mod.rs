@@ -1,7 +1,6 @@
 //! What a robot is: checked once, immutable, its holes resolved.
 
 mod backbone;
-mod bits;
 mod curve;
 mod tendon;
 
@@ -10,9 +9,9 @@ use nalgebra::{Matrix4, Vector3};
 pub use backbone::{Backbone, BackboneSpec};
 pub use tendon::{PerDisk, Routing, Tendon};
 
-use crate::error::InvalidInput;
+use crate::bits::{Bits, hash_by_bits};
+use crate::error::{self, InvalidInput};
 use crate::lie::{Pose, so3};
-use bits::{Bits, hash_by_bits};
 
 /// A tendon as the robot sees it: where it ends and which hole it passes on each disk.
 #[derive(Clone, Debug, PartialEq)]
@@ -233,9 +232,6 @@ fn tendon_names(tendons: &[Tendon]) -> Result<Vec<String>, InvalidInput> {
     Ok(names)
 }
 
-/// How far a rotation matrix may be from orthonormal: the rounding of hand-typed 1e-10 digits.
-const RIGID_TOLERANCE: f64 = 1e-9;
-
 /// A 4x4 homogeneous matrix as a rigid motion.
 ///
 /// # Errors
@@ -253,16 +249,6 @@ pub fn rigid_motion(argument: &str, matrix: &Matrix4<f64>) -> Result<Pose, Inval
     // + 0.0: no negative zeros, so that equal poses have equal bits.
     let rotation = matrix.fixed_view::<3, 3>(0, 0).map(|entry| entry + 0.0);
     let translation = matrix.fixed_view::<3, 1>(0, 3).map(|entry| entry + 0.0);
-    let error = (rotation.transpose() * rotation - nalgebra::Matrix3::identity()).amax();
-    if error > RIGID_TOLERANCE || rotation.determinant() < 0.0 {
-        let expected =
-            format!("a rotation in the upper left 3x3 (R^T R = I to {RIGID_TOLERANCE:e})");
-        let got = if error > RIGID_TOLERANCE {
-            format!("R^T R off by {error:.1e}")
-        } else {
-            "a reflection (determinant -1)".to_owned()
-        };
-        return Err(InvalidInput::new(argument, expected, got));
-    }
+    error::rotation(argument, "a rotation in the upper left 3x3", &rotation)?;
     Ok(Pose { rotation, translation })
 }

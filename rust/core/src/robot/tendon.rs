@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::bits::{Bits, hash_by_bits};
+use crate::bits::{Bits, hash_by_bits};
 use crate::error::{InvalidInput, finite, length, positive};
 
 /// One value for all disks, or one per disk 0..end.

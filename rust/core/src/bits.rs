@@ -7,28 +7,28 @@ use std::hash::Hasher;
 use nalgebra::Vector3;
 
 /// Feeds numbers to a hasher.
-pub(super) struct Bits<'a, H: Hasher>(pub(super) &'a mut H);
+pub(crate) struct Bits<'a, H: Hasher>(pub(super) &'a mut H);
 
 impl<H: Hasher> Bits<'_, H> {
-    pub(super) fn float(&mut self, value: f64) {
+    pub(crate) fn float(&mut self, value: f64) {
         self.0.write_u64(value.to_bits());
     }
 
-    pub(super) fn floats(&mut self, values: &[f64]) {
+    pub(crate) fn floats(&mut self, values: &[f64]) {
         self.0.write_usize(values.len());
         for &value in values {
             self.float(value);
         }
     }
 
-    pub(super) fn counts(&mut self, values: &[usize]) {
+    pub(crate) fn counts(&mut self, values: &[usize]) {
         self.0.write_usize(values.len());
         for &value in values {
             self.0.write_usize(value);
         }
     }
 
-    pub(super) fn vectors(&mut self, values: &[Vector3<f64>]) {
+    pub(crate) fn vectors(&mut self, values: &[Vector3<f64>]) {
         self.0.write_usize(values.len());
         for value in values {
             for &component in value {
@@ -37,11 +37,11 @@ impl<H: Hasher> Bits<'_, H> {
         }
     }
 
-    pub(super) fn option(&mut self, value: Option<f64>) {
+    pub(crate) fn option(&mut self, value: Option<f64>) {
         self.floats(value.as_slice());
     }
 
-    pub(super) fn text(&mut self, value: Option<&str>) {
+    pub(crate) fn text(&mut self, value: Option<&str>) {
         self.0.write_u8(u8::from(value.is_some()));
         self.0.write(value.unwrap_or_default().as_bytes());
     }
@@ -62,4 +62,4 @@ macro_rules! hash_by_bits {
     };
 }
 
-pub(super) use hash_by_bits;
+pub(crate) use hash_by_bits;

@@ -1,0 +1,98 @@
+//! The inside of a closed surface of triangles.
+
+mod check;
+mod query;
+mod surface;
+
+use std::hash::Hasher;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use super::{Near, moved, tightest_first};
+use crate::bits::Bits;
+use crate::error::InvalidInput;
+use crate::lie::Pose;
+use surface::Surface;
+
+/// The inside of a closed surface of triangles. Clones share the triangles.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    surface: Arc<Surface>,
+    pose: Pose,
+}
+
+impl Mesh {
+    /// From vertices \[m\] and faces, three vertex numbers each, counter-clockwise seen from outside.
+    ///
+    /// A surface that is inside out as a whole (its volume is negative) is turned; [`Mesh::faces`] then
+    /// gives the turned ones. Whether the surface cuts through itself is not checked.
+    ///
+    /// # Errors
+    /// `InvalidInput` naming `vertices` or `faces`: nothing there, a number that is not finite, a vertex
+    /// that does not exist, a triangle without area, a surface that is not closed (names the first edge
+    /// that has not two faces), faces that turn different ways (names the edge), surfaces that touch in a
+    /// single vertex, no volume.
+    pub fn new(vertices: &[Vector3<f64>], faces: &[[usize; 3]]) -> Result<Self, InvalidInput> {
+        let surface = Arc::new(Surface::new(vertices, faces)?);
+        Ok(Self { surface, pose: Pose::identity() })
+    }
+
+    /// Its vertices where they are now \[m\].
+    #[must_use]
+    pub fn vertices(&self) -> Vec<Vector3<f64>> {
+        self.surface.vertices.iter().map(|vertex| self.pose.transform(vertex)).collect()
+    }
+
+    /// Its faces, counter-clockwise seen from outside.
+    #[must_use]
+    pub fn faces(&self) -> &[[usize; 3]] {
+        &self.surface.faces
+    }
+
+    pub(super) fn transformed(&self, pose: &Pose) -> Self {
+        Self { surface: self.surface.clone(), pose: moved(pose, &self.pose) }
+    }
+
+    pub(super) fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
+        bits.vectors(&self.surface.vertices);
+        for face in &self.surface.faces {
+            bits.counts(face);
+        }
+        bits.floats(self.pose.rotation.as_slice());
+        bits.floats(self.pose.translation.as_slice());
+    }
+
+    fn local(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        self.pose.rotation.tr_mul(&(x - self.pose.translation))
+    }
+
+    pub(super) fn near(&self, x: &Vector3<f64>) -> Near {
+        self.surface.near(&self.local(x)).rotated(&self.pose.rotation)
+    }
+
+    /// See [`super::Obstacle::constraints`].
+    pub(super) fn constraints(
+        &self,
+        x: &Vector3<f64>,
+        reach: f64,
+        inside: bool,
+        out: &mut Vec<Near>,
+    ) {
+        let start = out.len();
+        self.surface.constraints(&self.local(x), reach, inside, out);
+        for entry in &mut out[start..] {
+            *entry = entry.rotated(&self.pose.rotation);
+        }
+        tightest_first(&mut out[start..]);
+    }
+}
+
+impl PartialEq for Mesh {
+    fn eq(&self, other: &Self) -> bool {
+        let same = Arc::ptr_eq(&self.surface, &other.surface)
+            || (self.surface.vertices == other.surface.vertices
+                && self.surface.faces == other.surface.faces);
+        same && self.pose == other.pose
+    }
+}

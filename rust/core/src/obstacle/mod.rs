@@ -1,0 +1,253 @@
+//! What a robot must stay out of, or inside of: volumes with signed distances.
+//!
+//! A point's signed distance is positive outside the volume; `inside` turns the volume into a lumen and
+//! the sign around. [`Obstacle::nearest`] gives it with its derivatives, [`Obstacle::constraints`] the
+//! conditions whose conjunction is, near a point, "outside the obstacle". The mathematics is in
+//! `docs/obstacles.md`.
+
+mod cuboid;
+mod mesh;
+mod signed_distance;
+mod smooth;
+
+use nalgebra::{Matrix3, Vector3};
+
+pub use cuboid::Cuboid;
+pub use mesh::Mesh;
+pub use signed_distance::{DistanceFunction, Fault, SignedDistance, by_differences};
+pub use smooth::{Capsule, Cylinder, HalfSpace, Sphere};
+
+use crate::bits::{Bits, hash_by_bits};
+use crate::lie::Pose;
+
+/// Points nearer to a centre, an axis or an edge than this have no direction away from it \[m\]: squares
+/// of their distance vanish.
+const KINK: f64 = 1e-150;
+
+/// A condition near a point: its value, to be kept at or above zero, with derivatives by the point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Near {
+    /// Signed distance, positive where the robot may be \[m\].
+    pub distance: f64,
+    /// Its gradient, a unit vector that points to where the robot may be (of a [`SignedDistance`]: as
+    /// long as the function's).
+    pub gradient: Vector3<f64>,
+    /// Its Hessian \[1/m\]: zero before flat faces, (I - n nᵀ)/r before a corner at distance r.
+    pub hessian: Matrix3<f64>,
+    /// Which part of the obstacle this is: the same number for the same face, edge or vertex, from
+    /// wherever it is looked at; 0 for a volume of one part.
+    pub feature: u32,
+}
+
+impl Near {
+    /// Before a plane through which `distance` is measured.
+    fn flat(distance: f64, normal: Vector3<f64>) -> Self {
+        Self { distance, gradient: normal, hessian: Matrix3::zeros(), feature: 0 }
+    }
+
+    /// Around a point, a line or a sphere, tube or rounding of `radius` about it. `from` leads to the
+    /// point, across the line; `across` projects on what can curve (I, or I - t tᵀ).
+    fn round(from: &Vector3<f64>, across: &Matrix3<f64>, radius: f64, kink: Vector3<f64>) -> Self {
+        let r = from.norm();
+        if r < KINK {
+            return Self::flat(-radius, kink);
+        }
+        let normal = from / r;
+        let hessian = (across - normal * normal.transpose()) / r;
+        Self { distance: r - radius, gradient: normal, hessian, feature: 0 }
+    }
+
+    /// The same seen from the other side.
+    fn flipped(self, flip: bool) -> Self {
+        if !flip {
+            return self;
+        }
+        let (gradient, hessian) = (-self.gradient, -self.hessian);
+        Self { distance: -self.distance, gradient, hessian, feature: self.feature }
+    }
+
+    fn rotated(self, rotation: &Matrix3<f64>) -> Self {
+        let gradient = rotation * self.gradient;
+        Self { gradient, hessian: rotation * self.hessian * rotation.transpose(), ..self }
+    }
+
+    fn of(self, feature: usize) -> Self {
+        // Meshes are checked to have fewer parts than u32 counts.
+        Self { feature: u32::try_from(feature).unwrap_or(u32::MAX), ..self }
+    }
+}
+
+/// The shapes an obstacle can have.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Volume {
+    /// A ball.
+    Sphere(Sphere),
+    /// An infinite round bar.
+    Cylinder(Cylinder),
+    /// All that lies behind a plane.
+    HalfSpace(HalfSpace),
+    /// A bar with round ends.
+    Capsule(Capsule),
+    /// A box with any axes.
+    Cuboid(Cuboid),
+    /// The inside of a closed surface of triangles.
+    Mesh(Mesh),
+    /// Whatever a function calls the inside.
+    SignedDistance(SignedDistance),
+}
+
+macro_rules! volume_from {
+    ($($name:ident),*) => {$(
+        impl From<$name> for Volume {
+            fn from(volume: $name) -> Self {
+                Self::$name(volume)
+            }
+        }
+    )*};
+}
+
+volume_from!(Sphere, Cylinder, HalfSpace, Capsule, Cuboid, Mesh, SignedDistance);
+
+/// A volume that the robot stays out of, or inside of. Cheap to clone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Obstacle {
+    volume: Volume,
+    inside: bool,
+}
+
+impl Obstacle {
+    /// A checked volume; with `inside` the robot has to stay in it.
+    #[must_use]
+    pub fn new(volume: impl Into<Volume>, inside: bool) -> Self {
+        Self { volume: volume.into(), inside }
+    }
+
+    /// Its shape.
+    #[must_use]
+    pub fn volume(&self) -> &Volume {
+        &self.volume
+    }
+
+    /// Whether the robot has to stay in it.
+    #[must_use]
+    pub fn inside(&self) -> bool {
+        self.inside
+    }
+
+    /// The same obstacle moved: given in the frame `pose`, seen from outside that frame.
+    #[must_use]
+    pub fn transformed(&self, pose: &Pose) -> Self {
+        let volume = match &self.volume {
+            Volume::Sphere(v) => v.transformed(pose).into(),
+            Volume::Cylinder(v) => v.transformed(pose).into(),
+            Volume::HalfSpace(v) => v.transformed(pose).into(),
+            Volume::Capsule(v) => v.transformed(pose).into(),
+            Volume::Cuboid(v) => v.transformed(pose).into(),
+            Volume::Mesh(v) => v.transformed(pose).into(),
+            Volume::SignedDistance(v) => v.transformed(pose).into(),
+        };
+        Self { volume, inside: self.inside }
+    }
+
+    /// The signed distance of a point \[m\] with its derivatives.
+    ///
+    /// Where the nearest place is not unique one of them is taken, always the same. The Hessian of a
+    /// [`SignedDistance`] is left zero here.
+    ///
+    /// # Errors
+    /// A [`SignedDistance`] that failed; no other volume can.
+    pub fn nearest(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+        let near = match &self.volume {
+            Volume::Sphere(v) => v.near(x),
+            Volume::Cylinder(v) => v.near(x),
+            Volume::HalfSpace(v) => v.near(x),
+            Volume::Capsule(v) => v.near(x),
+            Volume::Cuboid(v) => v.near(x),
+            Volume::Mesh(v) => v.near(x),
+            Volume::SignedDistance(v) => v.near(x)?,
+        };
+        Ok(near.flipped(self.inside))
+    }
+
+    /// Appends the conditions that together say, near `x`, that a point is where it may be: all that a
+    /// step of up to `reach` \[m\] can meet, and the nearest in any case; tightest first. A body around
+    /// the point adds its radius to the reach.
+    ///
+    /// One for a smooth volume; for a box or a mesh one for every face, edge or vertex that is a nearest
+    /// place of its neighbourhood, or meets such a one in a hollow of the obstacle. They hold together
+    /// (and), never in the alternative; where `x` has sunk into the obstacle the nearest way out is
+    /// taken, and the reach counts from there.
+    ///
+    /// # Errors
+    /// A [`SignedDistance`] that failed; no other volume can. `out` is then as it was.
+    pub fn constraints(
+        &self,
+        x: &Vector3<f64>,
+        reach: f64,
+        out: &mut Vec<Near>,
+    ) -> Result<(), Fault> {
+        match &self.volume {
+            Volume::Cuboid(cuboid) if self.inside => cuboid.lumen(x, reach, out),
+            Volume::Mesh(mesh) => mesh.constraints(x, reach, self.inside, out),
+            Volume::SignedDistance(function) => {
+                out.push(function.curved(x, reach)?.flipped(self.inside));
+            }
+            _ => out.push(self.nearest(x)?),
+        }
+        Ok(())
+    }
+}
+
+hash_by_bits!(Obstacle, |obstacle, bits| {
+    bits.counts(&[usize::from(obstacle.inside)]);
+    match &obstacle.volume {
+        Volume::Sphere(v) => {
+            bits.vectors(&[v.center()]);
+            bits.float(v.radius());
+        }
+        Volume::Cylinder(v) => {
+            bits.vectors(&[v.point(), v.axis()]);
+            bits.float(v.radius());
+        }
+        Volume::HalfSpace(v) => bits.vectors(&[v.point(), v.normal()]),
+        Volume::Capsule(v) => {
+            bits.vectors(&[v.a(), v.b()]);
+            bits.float(v.radius());
+        }
+        Volume::Cuboid(v) => {
+            bits.vectors(&[v.center(), v.half_extents()]);
+            bits.floats(v.rotation().as_slice());
+        }
+        Volume::Mesh(v) => v.hash_bits(&mut bits),
+        Volume::SignedDistance(v) => bits.counts(&[v.address()]),
+    }
+});
+
+/// How far from a point places count.
+fn within(distance: f64, reach: f64) -> f64 {
+    reach - distance.min(0.0)
+}
+
+/// In the order of their distances, and of their places among equals.
+fn tightest_first(entries: &mut [Near]) {
+    entries
+        .sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance).then(a.feature.cmp(&b.feature)));
+}
+
+/// A rigid motion without negative zeros, so that equal obstacles have equal bits.
+fn moved(pose: &Pose, inner: &Pose) -> Pose {
+    let pose = pose.compose(inner);
+    let (rotation, translation) =
+        (pose.rotation.map(|e| e + 0.0), pose.translation.map(|e| e + 0.0));
+    Pose { rotation, translation }
+}
+
+/// A place moved, without negative zeros.
+fn moved_point(pose: &Pose, point: &Vector3<f64>) -> Vector3<f64> {
+    pose.transform(point).map(|e| e + 0.0)
+}
+
+/// A direction turned, without negative zeros.
+fn turned(pose: &Pose, direction: &Vector3<f64>) -> Vector3<f64> {
+    (pose.rotation * direction).map(|e| e + 0.0)
+}

@@ -1,0 +1,125 @@
+//! Volumes that a function describes.
+
+use std::fmt;
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Near, moved};
+use crate::error::InvalidInput;
+use crate::lie::Pose;
+
+/// What a distance function failed with.
+pub type Fault = Box<dyn std::error::Error + Send + Sync>;
+
+/// A signed distance \[m\] and its gradient at a point.
+pub type DistanceFunction =
+    Arc<dyn Fn(&Vector3<f64>) -> Result<(f64, Vector3<f64>), Fault> + Send + Sync>;
+
+/// A gradient from values alone: central differences with a step of ε^(1/3) of the largest of the
+/// point's coordinates, the distance and 1 cm, where rounding and the third derivative cost alike.
+pub fn by_differences<F>(value: F) -> DistanceFunction
+where
+    F: Fn(&Vector3<f64>) -> Result<f64, Fault> + Send + Sync + 'static,
+{
+    Arc::new(move |x| {
+        let distance = value(x)?;
+        let h = f64::EPSILON.cbrt() * scale(x, distance);
+        let mut gradient = Vector3::zeros();
+        for i in 0..3 {
+            let (ahead, behind) = beside(x, i, h);
+            gradient[i] = (value(&ahead)? - value(&behind)?) / (ahead[i] - behind[i]);
+        }
+        Ok((distance, gradient))
+    })
+}
+
+/// What differences around a point are taken over a small share of \[m\].
+fn scale(x: &Vector3<f64>, distance: f64) -> f64 {
+    x.amax().max(distance.abs()).max(0.01)
+}
+
+fn beside(x: &Vector3<f64>, axis: usize, h: f64) -> (Vector3<f64>, Vector3<f64>) {
+    let (mut ahead, mut behind) = (*x, *x);
+    ahead[axis] += h;
+    behind[axis] -= h;
+    (ahead, behind)
+}
+
+/// Whatever a function calls the inside: negative there, positive outside.
+#[derive(Clone)]
+pub struct SignedDistance {
+    function: DistanceFunction,
+    /// The frame in which the function is asked.
+    pose: Pose,
+}
+
+impl SignedDistance {
+    /// From a function of points in the world.
+    #[must_use]
+    pub fn new(function: DistanceFunction) -> Self {
+        Self { function, pose: Pose::identity() }
+    }
+
+    pub(super) fn transformed(&self, pose: &Pose) -> Self {
+        Self { function: self.function.clone(), pose: moved(pose, &self.pose) }
+    }
+
+    /// A number that clones share and no other function has.
+    pub(super) fn address(&self) -> usize {
+        Arc::as_ptr(&self.function).cast::<()>().addr()
+    }
+
+    fn evaluate(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+        let (distance, gradient) = (self.function)(x)?;
+        let at = || format!("at ({:?}, {:?}, {:?})", x.x, x.y, x.z);
+        if !distance.is_finite() {
+            let got = format!("{distance:?} {}", at());
+            return Err(InvalidInput::new("f", "a finite distance [m]", got).into());
+        }
+        if gradient.iter().any(|component| !component.is_finite()) {
+            let [a, b, c] = gradient.into();
+            let got = format!("({a:?}, {b:?}, {c:?}) {}", at());
+            return Err(InvalidInput::new("gradient", "three finite numbers", got).into());
+        }
+        Ok(Near::flat(distance, gradient))
+    }
+
+    fn local(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        self.pose.rotation.tr_mul(&(x - self.pose.translation))
+    }
+
+    pub(super) fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+        Ok(self.evaluate(&self.local(x))?.rotated(&self.pose.rotation))
+    }
+
+    /// With the Hessian within reach of the surface: central differences of the gradient, whose step of
+    /// ε^(1/4) suits gradients that are differences themselves.
+    pub(super) fn curved(&self, x: &Vector3<f64>, reach: f64) -> Result<Near, Fault> {
+        let x = self.local(x);
+        let mut near = self.evaluate(&x)?;
+        if near.distance.abs() <= reach {
+            let h = f64::EPSILON.sqrt().sqrt() * scale(&x, near.distance);
+            let mut columns = Matrix3::zeros();
+            for i in 0..3 {
+                let (ahead, behind) = beside(&x, i, h);
+                let change = self.evaluate(&ahead)?.gradient - self.evaluate(&behind)?.gradient;
+                columns.set_column(i, &(change / (ahead[i] - behind[i])));
+            }
+            near.hessian = (columns + columns.transpose()) / 2.0;
+        }
+        Ok(near.rotated(&self.pose.rotation))
+    }
+}
+
+impl PartialEq for SignedDistance {
+    fn eq(&self, other: &Self) -> bool {
+        self.address() == other.address() && self.pose == other.pose
+    }
+}
+
+impl fmt::Debug for SignedDistance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SignedDistance").field("pose", &self.pose).finish_non_exhaustive()
+    }
+}
