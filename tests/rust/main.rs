@@ -10,6 +10,7 @@
 mod batch;
 mod common;
 mod constant_curvature;
+mod contact_golden;
 mod constant_curvature_robot;
 mod inverse;
 mod inverse_bounds;

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::error::InvalidInput;
 use crate::lie::Pose;
 use crate::robot::Robot;
-use crate::shape::Shape;
+use crate::shape::{Contact, Shape};
 use crate::status::Status;
 
 /// The solved quantities, in buffers that are reused from one solve to the next.
@@ -21,6 +21,8 @@ pub struct State {
     pub tendon_lengths: Vec<f64>,
     /// Tension of every tendon; NaN in models that know no forces.
     pub tensions: Vec<f64>,
+    /// Where the robot touches obstacles.
+    pub contacts: Vec<Contact>,
     /// Strain energy of the backbone \[J, or 1/m in units of EI\].
     pub energy: f64,
 }
@@ -44,6 +46,7 @@ impl State {
         self.elongations.clear();
         self.tendon_lengths.clear();
         self.tensions.clear();
+        self.contacts.clear();
         self.energy = 0.0;
     }
 }

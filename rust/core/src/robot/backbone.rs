@@ -190,8 +190,13 @@ impl Backbone {
     /// Axial stiffness EA of a subsegment \[N\], where Young's modulus is known.
     #[must_use]
     pub fn axial_stiffness(&self, subsegment: usize) -> Option<f64> {
-        let diameter = self.diameter(subsegment)?;
-        Some(self.spec.youngs_modulus? * PI * diameter * diameter / 4.0)
+        Some(self.spec.youngs_modulus? * self.area(subsegment)?)
+    }
+
+    /// Area of the cross-section of a subsegment \[m²\], where its diameter is known.
+    #[must_use]
+    pub fn area(&self, subsegment: usize) -> Option<f64> {
+        self.diameter(subsegment).map(|diameter| PI * diameter * diameter / 4.0)
     }
 
     fn diameter(&self, subsegment: usize) -> Option<f64> {

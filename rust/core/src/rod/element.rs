@@ -87,6 +87,17 @@ impl Element {
         self.sweep.tr_mul(force) / (1.0 + self.elongation)
     }
 
+    /// Second derivatives by the strain of a moment's work on the rotation of its end, in exponential
+    /// coordinates: the symmetric part of the derivative of `spinᵀ moment`.
+    pub(super) fn spin_curvature(&self, moment: &Vector3<f64>) -> Matrix3<f64> {
+        let w = &self.strain;
+        let along = w.dot(moment);
+        let bent = w * along - moment * w.norm_squared();
+        let rows = (moment.cross(w) * self.b.1 + bent * self.c.1) * w.transpose()
+            - moment * w.transpose() * self.c.0;
+        (rows + rows.transpose()) * 0.5 + Matrix3::from_diagonal_element(self.c.0 * along)
+    }
+
     /// Second derivatives by the strain of `sum u·(origin + Exp(w) x)` over tendons, given the sums of
     /// `u`, of `x × u` and of `u xᵀ`.
     #[inline]

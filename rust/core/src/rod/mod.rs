@@ -2,6 +2,7 @@
 
 mod ascent;
 mod chain;
+pub mod contact;
 mod element;
 mod message;
 mod model;

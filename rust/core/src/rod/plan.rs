@@ -149,6 +149,11 @@ impl Plan {
         self.data[i].length * self.settings.elements as f64
     }
 
+    /// Rest length from base to tip \[m\].
+    pub(super) fn total_length(&self) -> f64 {
+        (0..self.data.len()).map(|i| self.length(i)).sum()
+    }
+
     /// Unknowns of an element.
     pub(super) fn unknowns(&self) -> usize {
         if self.settings.axial { 4 } else { 3 }

@@ -1,0 +1,241 @@
+//! From a shape to the nearest minimum among the obstacles: Newton's method on the augmented Lagrangian.
+
+use super::field::Field;
+use super::merit::{Estimates, Merit};
+use super::scene::Scene;
+use super::sweep::{At, Sweep};
+use crate::obstacle::Fault;
+use crate::rod::ascent::Ending;
+use crate::rod::plan::Plan;
+
+/// No strain moves further in one step \[rad\].
+const STEP: f64 = 0.5;
+/// Halvings of a step, and the share of the predicted decrease that it must deliver.
+const BACKTRACKS: usize = 30;
+const ARMIJO: f64 = 1e-4;
+/// Share of a value that its rounding may be.
+const ROUNDING: f64 = 1e-14;
+/// Compliance of the conditions, as a share of what the rod itself gives at its stiffest.
+pub(super) const GIVE: f64 = 1e-3;
+/// Estimates are renewed when the shape is this near balance \[rad of the subsegments' stiffness\], and the
+/// more often the nearer they are.
+const LOOSE: f64 = 1e-3;
+/// A nudge off a saddle \[rad\], and how often.
+const NUDGE: f64 = 1e-2;
+const NUDGES: usize = 6;
+
+/// What a descent is made in.
+pub(super) struct Surroundings<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) scene: &'a Scene,
+    /// Share of the loads.
+    pub(super) share: f64,
+    pub(super) bounds: &'a [f64],
+    /// How far off parts of obstacles are looked at \[m\].
+    pub(super) reach: f64,
+    /// How far a point may go past another than through free space, in one step \[m\].
+    pub(super) slip: f64,
+}
+
+/// What is left of the conditions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Left {
+    /// Unbalanced moment, relative to the stiffness.
+    pub(super) moment: f64,
+    /// Violations of lengths, of gaps and of their complementarity, relative to lengths.
+    pub(super) length: f64,
+    /// Newton steps off a saddle.
+    pub(super) nudged: usize,
+}
+
+impl Left {
+    pub(super) fn worst(&self) -> f64 {
+        self.moment.max(self.length)
+    }
+}
+
+/// Buffers of a descent.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Descent {
+    pub(super) here: Merit,
+    there: Merit,
+    pub(super) estimates: Estimates,
+    sweep: Sweep,
+    fields: Vec<Field>,
+    taut: Vec<bool>,
+    gives: Vec<f64>,
+}
+
+impl Descent {
+    /// Goes from the strains in `here` and the estimates to a minimum, in at most `budget` evaluations of
+    /// derivatives, which are counted down.
+    pub(super) fn go(
+        &mut self,
+        around: &Surroundings<'_>,
+        budget: &mut usize,
+    ) -> Result<(Ending, Left), Fault> {
+        let tolerance = around.plan.settings.tolerance;
+        let mut left = Left::default();
+        let (mut loose, mut before) = (LOOSE, f64::INFINITY);
+        self.evaluate_here(around)?;
+        loop {
+            self.factor(around);
+            *budget = budget.saturating_sub(1);
+            left = Left { moment: self.sweep.moment, ..self.left(around, left.nudged) };
+            if !left.worst().is_finite() {
+                return Ok((Ending::Broken, left));
+            }
+            if left.worst() <= tolerance {
+                if self.sweep.unstable.is_none() || left.nudged >= NUDGES {
+                    let stable = self.sweep.unstable.is_none();
+                    return Ok((if stable { Ending::Converged } else { Ending::Lost }, left));
+                }
+                self.nudge(around)?;
+                left.nudged += 1;
+                (loose, before) = (LOOSE, f64::INFINITY);
+                continue;
+            }
+            if *budget == 0 {
+                return Ok((Ending::Spent, left));
+            }
+            if left.moment <= loose && left.length > tolerance {
+                self.renew(around, left.length > 0.25 * before);
+                before = left.length;
+                loose = (0.1 * loose).max(0.5 * tolerance);
+                self.evaluate_here(around)?;
+                self.factor(around);
+            }
+            if !self.step(around)? {
+                // No further decrease: the rounding of the value, or a kink.
+                if left.moment > 1e3 * tolerance {
+                    return Ok((Ending::Lost, left));
+                }
+                self.renew(around, false);
+                self.evaluate_here(around)?;
+            }
+        }
+    }
+
+    fn evaluate_here(&mut self, around: &Surroundings<'_>) -> Result<(), Fault> {
+        let Surroundings { plan, scene, bounds, share, reach, .. } = *around;
+        self.here.evaluate(plan, scene, bounds, share, &self.estimates, reach)
+    }
+
+    fn factor(&mut self, around: &Surroundings<'_>) {
+        self.here.fields(around.scene, around.share, self.estimates.give, &mut self.fields);
+        self.taut.clear();
+        self.taut.extend(self.here.tensions.iter().map(|tension| *tension > 0.0));
+        self.gives.clear();
+        let own = self.estimates.tendon_give.iter().zip(&around.plan.compliance);
+        self.gives.extend(own.map(|(give, own)| give + own));
+        self.sweep.factor(&At {
+            plan: around.plan,
+            strains: &self.here.strains,
+            frames: &self.here.frames,
+            fields: &self.fields,
+            tensions: &self.here.tensions,
+            taut: &self.taut,
+            give: &self.gives,
+        });
+    }
+
+    /// Violations at this shape: of what the multipliers stand for.
+    fn left(&self, around: &Surroundings<'_>, nudged: usize) -> Left {
+        let plan = around.plan;
+        let mut length = 0.0_f64;
+        for (k, tension) in self.here.tensions.iter().enumerate() {
+            if around.bounds[k].is_finite() {
+                let over = self.here.over[k] - plan.compliance[k] * tension;
+                let off = if *tension > 0.0 { over.abs() } else { over.max(0.0) };
+                length = length.max(off / plan.rest_lengths[k]);
+            }
+        }
+        let whole = plan.total_length();
+        for entry in &self.here.entries {
+            let off = if entry.force > 0.0 { entry.gap.abs() } else { (-entry.gap).max(0.0) };
+            length = length.max(off / whole);
+        }
+        Left { moment: 0.0, length, nudged }
+    }
+
+    /// Makes the multipliers the estimates; stiffer conditions where they did not help.
+    fn renew(&mut self, around: &Surroundings<'_>, stiffer: bool) {
+        let estimates = &mut self.estimates;
+        estimates.tensions.clone_from(&self.here.tensions);
+        estimates.forces.clear();
+        let pushing = self.here.entries.iter().filter(|entry| entry.force > 0.0);
+        estimates.forces.extend(pushing.map(|entry| (entry.key, entry.force)));
+        if stiffer {
+            let least = 1e-3 * contact_give(around.plan);
+            estimates.give = (0.1 * estimates.give).max(least);
+            estimates.tendon_give.iter_mut().for_each(|give| *give = (0.1 * *give).max(1e-12));
+        }
+    }
+
+    /// Takes as much of the Newton step as lowers the value; false when nothing does.
+    fn step(&mut self, around: &Surroundings<'_>) -> Result<bool, Fault> {
+        let longest = self.sweep.step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+        let slope = self.sweep.descent();
+        if slope.is_nan() || longest == 0.0 {
+            return Ok(false);
+        }
+        let mut share = 1.0_f64.min(STEP / longest);
+        for _ in 0..BACKTRACKS {
+            self.there.strains.clear();
+            let moved = self.here.strains.iter().zip(&self.sweep.step);
+            self.there.strains.extend(moved.map(|(own, step)| own + share * step));
+            let Surroundings { plan, scene, bounds, share: loads, reach, .. } = *around;
+            self.there.evaluate(plan, scene, bounds, loads, &self.estimates, reach)?;
+            let wanted = self.here.value + ARMIJO * share * slope + ROUNDING * self.here.size
+                - self.moment_work(around, share);
+            if self.there.value <= wanted && self.passes(around) {
+                std::mem::swap(&mut self.here, &mut self.there);
+                return Ok(true);
+            }
+            share *= 0.5;
+        }
+        Ok(false)
+    }
+
+    /// Work that a moment on the tip, which has no potential, does along a share of the step: to be spent.
+    fn moment_work(&self, around: &Surroundings<'_>, _share: f64) -> f64 {
+        let moment = around.scene.moment * around.share;
+        if moment.norm_squared() == 0.0 {
+            return 0.0;
+        }
+        let (from, to) = (self.here.frames.last(), self.there.frames.last());
+        let (Some(from), Some(to)) = (from, to) else { return 0.0 };
+        -moment.dot(&crate::lie::so3::log(&(to.rotation * from.rotation.transpose())))
+    }
+
+    /// Whether no point can have gone through an obstacle: it went through the free space around its two
+    /// places, or slipped along a surface.
+    fn passes(&self, around: &Surroundings<'_>) -> bool {
+        let (here, there) = (&self.here, &self.there);
+        let ways = here.places.iter().zip(&there.places).zip(here.clear.iter().zip(&there.clear));
+        ways.into_iter().all(|((from, to), (before, after))| {
+            (to - from).norm() <= before.max(0.0) + after.max(0.0) + around.slip
+        })
+    }
+
+    /// Leaves a saddle.
+    fn nudge(&mut self, around: &Surroundings<'_>) -> Result<(), Fault> {
+        let size = around.plan.width();
+        if let Some(i) = self.sweep.unstable {
+            let own = &mut self.here.strains[i * size..(i + 1) * size];
+            for (own, escape) in own.iter_mut().zip(&self.sweep.escape) {
+                *own += NUDGE * escape;
+            }
+        }
+        self.evaluate_here(around)
+    }
+}
+
+/// Compliance of contacts that is small against what a subsegment gives.
+pub(super) fn contact_give(plan: &Plan) -> f64 {
+    let gives = plan.data.iter().enumerate().map(|(i, data)| {
+        let length = plan.length(i);
+        length * length * plan.settings.elements as f64 / data.stiffness[0]
+    });
+    GIVE * gives.fold(f64::INFINITY, f64::min)
+}

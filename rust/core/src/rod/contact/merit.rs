@@ -1,0 +1,185 @@
+//! The augmented Lagrangian of a rod with bounded tendons among obstacles: its value at a shape.
+//!
+//! Every condition has a multiplier's estimate and a small compliance: a tendon that is too long by s pulls with
+//! `max(0, (c T̂ + s) / (c + C))`, C its own compliance, a point that has sunk in by s is pushed with
+//! `max(0, λ̂ + s / c)`. What is minimised is then smooth, and exact once the estimates are the multipliers.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::field::Field;
+use super::scene::Scene;
+use crate::lie::Pose;
+use crate::obstacle::{Fault, Near};
+use crate::rod::plan::Plan;
+use crate::rod::subsegment::Local;
+
+/// Name of a condition: disk, point, obstacle, part of the obstacle.
+pub(super) type Key = (usize, usize, usize, u32);
+
+/// A point before an obstacle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entry {
+    pub(super) key: Key,
+    /// Place of the robot's point in the base's frame \[m\].
+    pub(super) at: Vector3<f64>,
+    pub(super) near: Near,
+    /// Distance left, the body's radius taken off \[m\].
+    pub(super) gap: f64,
+    /// Multiplier, at these estimates.
+    pub(super) force: f64,
+}
+
+/// A shape and what it is worth.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Merit {
+    pub(super) strains: Vec<f64>,
+    /// Frame of every disk in the base's, and of every subsegment's end in its base disk's.
+    pub(super) frames: Vec<Pose>,
+    pub(super) ends: Vec<Pose>,
+    pub(super) entries: Vec<Entry>,
+    /// Nearest distance of every point of every disk.
+    pub(super) clear: Vec<f64>,
+    pub(super) places: Vec<Vector3<f64>>,
+    /// What tendons are longer than their bounds, elasticity left out \[m\], and their tensions.
+    pub(super) over: Vec<f64>,
+    pub(super) tensions: Vec<f64>,
+    pub(super) value: f64,
+    /// Sum of the sizes of what the value is made of: its rounding.
+    pub(super) size: f64,
+    local: Local,
+    near: Vec<Near>,
+}
+
+/// Estimates of the multipliers and the compliances that go with them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Estimates {
+    pub(super) tensions: Vec<f64>,
+    /// Those that are not zero, by key, in order.
+    pub(super) forces: Vec<(Key, f64)>,
+    /// Of each tendon and of contacts \[m per unit\].
+    pub(super) tendon_give: Vec<f64>,
+    pub(super) give: f64,
+}
+
+impl Estimates {
+    fn force(&self, key: &Key) -> f64 {
+        let place = self.forces.binary_search_by(|(own, _)| own.cmp(key));
+        place.map_or(0.0, |k| self.forces[k].1)
+    }
+}
+
+impl Merit {
+    /// Evaluates the strains in [`Merit::strains`] for bounds of the tendons (infinite: free) and a share of
+    /// the loads. `reach`: how far off parts of obstacles are looked at \[m\].
+    pub(super) fn evaluate(
+        &mut self,
+        plan: &Plan,
+        scene: &Scene,
+        bounds: &[f64],
+        share: f64,
+        estimates: &Estimates,
+        reach: f64,
+    ) -> Result<(), Fault> {
+        match plan.unknowns() {
+            3 => self.place::<3>(plan, bounds.len()),
+            _ => self.place::<4>(plan, bounds.len()),
+        }
+        self.tensions.clear();
+        for (k, bound) in bounds.iter().enumerate() {
+            let give = estimates.tendon_give[k];
+            let all = give + plan.compliance[k];
+            self.over[k] -= bound;
+            let pull = (give * estimates.tensions[k] + self.over[k]) / all;
+            let tension = if bound.is_finite() { pull.max(0.0) } else { 0.0 };
+            self.tensions.push(tension);
+            self.value += 0.5 * all * tension * tension;
+            self.size += 0.5 * all * tension * tension;
+        }
+        for (frame, force) in self.frames.iter().zip(&scene.forces) {
+            let work = share * force.dot(&frame.translation);
+            self.value -= work;
+            self.size += work.abs();
+        }
+        self.touch(scene, estimates, reach)
+    }
+
+    fn place<const D: usize>(&mut self, plan: &Plan, tendons: usize) {
+        let size = plan.width();
+        self.frames.clear();
+        self.ends.clear();
+        self.over.clear();
+        self.over.resize(tendons, 0.0);
+        self.value = 0.0;
+        let mut frame = Pose::identity();
+        self.frames.push(frame);
+        for (i, data) in plan.data.iter().enumerate() {
+            let strains = &self.strains[i * size..(i + 1) * size];
+            self.local.place::<D>(plan.settings.subsegment, data, strains);
+            let end = self.local.end();
+            frame = frame.compose(&end);
+            self.frames.push(frame);
+            self.ends.push(end);
+            for (k, strain) in strains.iter().enumerate() {
+                let off = strain - data.rest[k % D];
+                self.value += 0.5 * data.stiffness[k % D] * off * off;
+            }
+            for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
+                self.over[piece.tendon] += (end.transform(&piece.to) - piece.from).norm();
+            }
+        }
+        self.size = self.value;
+    }
+
+    /// The points before the obstacles.
+    fn touch(&mut self, scene: &Scene, estimates: &Estimates, reach: f64) -> Result<(), Fault> {
+        self.entries.clear();
+        self.clear.clear();
+        self.places.clear();
+        for (disk, points) in scene.points.iter().enumerate() {
+            let frame = &self.frames[disk];
+            for (p, point) in points.iter().enumerate() {
+                let at = frame.transform(&point.at);
+                let mut clear = f64::INFINITY;
+                for (o, obstacle) in scene.obstacles.iter().enumerate() {
+                    self.near.clear();
+                    obstacle.constraints(&at, reach + point.radius, &mut self.near)?;
+                    for near in &self.near {
+                        let gap = near.distance - point.radius;
+                        clear = clear.min(gap);
+                        let key = (disk, p, o, near.feature);
+                        let force = (estimates.force(&key) - gap / estimates.give).max(0.0);
+                        if force > 0.0 || gap < reach {
+                            self.entries.push(Entry { key, at, near: *near, gap, force });
+                        }
+                        let worth = 0.5 * estimates.give * force * force;
+                        self.value += worth;
+                        self.size += worth;
+                    }
+                }
+                self.places.push(at);
+                self.clear.push(clear);
+            }
+        }
+        self.entries.sort_by_key(|entry| entry.key);
+        Ok(())
+    }
+
+    /// Potentials of the disks at this shape.
+    pub(super) fn fields(&self, scene: &Scene, share: f64, give: f64, out: &mut Vec<Field>) {
+        out.clear();
+        out.resize(self.frames.len(), Field::zero());
+        if scene.loaded {
+            for ((field, frame), force) in out.iter_mut().zip(&self.frames).zip(&scene.forces) {
+                field.add_point(&frame.translation, &(force * -share), &Matrix3::zeros());
+            }
+            if let Some(tip) = out.last_mut() {
+                tip.add_moment(&(scene.moment * -share));
+            }
+        }
+        for entry in self.entries.iter().filter(|entry| entry.force > 0.0) {
+            let n = entry.near.gradient;
+            let curvature = n * n.transpose() / give - entry.near.hessian * entry.force;
+            out[entry.key.0].add_point(&entry.at, &(n * -entry.force), &curvature);
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! The rod among obstacles and under loads as a forward model.
+
+use nalgebra::Vector3;
+
+use super::descent::{Descent, GIVE, Left, Surroundings, contact_give};
+use super::scene::Scene;
+use crate::error::InvalidInput;
+use crate::lie::Pose;
+use crate::model::{Model, Report, State};
+use crate::obstacle::Fault;
+use crate::robot::Robot;
+use crate::rod::ascent::Ending;
+use crate::rod::chain::Chain;
+use crate::rod::model::Rod;
+use crate::rod::plan::Plan;
+use crate::rod::settings::TendonRule;
+use crate::shape::Contact;
+use crate::status::Status;
+
+/// Share of the load that is taken first among obstacles, the least, and steps that make the next one longer.
+const FIRST: f64 = 0.25;
+const SHORTEST: f64 = 1e-3;
+const EASY: usize = 10;
+/// Evaluations that one load step may take.
+const PATIENCE: usize = 60;
+/// Parts of obstacles within this share of a subsegment are looked at, and points may slip by this share of
+/// one in one step.
+const REACH: f64 = 0.05;
+const SLIP: f64 = 0.25;
+/// Contacts are listed up to this gap, in shares of the robot's length.
+const TOUCH: f64 = 1e-9;
+
+/// Buffers of a solve.
+#[derive(Debug, Default)]
+pub struct Workspace {
+    state: State,
+    descent: Descent,
+    /// For the compliance of the tendons at rest.
+    chain: Chain,
+    /// Strains and bounds of the last solve, or at the last load that was reached.
+    kept: Kept,
+    left: Left,
+    ending: Ending,
+    /// Share of the load that was reached.
+    load: f64,
+    /// How deep the undeformed robot is in an obstacle, which, and at which disk.
+    sunk: Option<(f64, usize, usize)>,
+    fault: Option<Fault>,
+}
+
+#[derive(Debug, Default)]
+struct Kept {
+    strains: Vec<f64>,
+    tensions: Vec<f64>,
+    forces: Vec<(super::merit::Key, f64)>,
+    bounds: Vec<f64>,
+}
+
+impl Workspace {
+    /// What a function of an obstacle ended the last solve with, if it did.
+    pub fn take_fault(&mut self) -> Option<Fault> {
+        self.fault.take()
+    }
+}
+
+/// A rod in its surroundings, ready to solve.
+#[derive(Clone, Debug)]
+pub struct LoadedRod<'r> {
+    rod: Rod<'r>,
+    scene: &'r Scene,
+}
+
+impl<'r> LoadedRod<'r> {
+    /// Solves with a plan and a scene that were made of this robot.
+    ///
+    /// # Errors
+    /// `InvalidInput` for proportional tendons, which leave contacts no freedom.
+    pub fn new(robot: &'r Robot, plan: &'r Plan, scene: &'r Scene) -> Result<Self, InvalidInput> {
+        if plan.settings.tendons == TendonRule::Proportional {
+            let expected = "\"sliding\" among obstacles or under loads";
+            return Err(InvalidInput::new("tendons", expected, "\"proportional\""));
+        }
+        Ok(Self { rod: Rod::new(robot, plan), scene })
+    }
+
+    fn plan(&self) -> &'r Plan {
+        self.rod.plan
+    }
+
+    /// Puts the rest shape without multipliers, and compliances that are small against the rod's.
+    fn begin(&self, displacements: &[f64], work: &mut Workspace) {
+        let plan = self.plan();
+        let chain = &mut work.chain;
+        chain.rest(plan);
+        chain.bounds.clear();
+        let rest = plan.rest_lengths.iter();
+        chain.bounds.extend(rest.zip(displacements).map(|(length, d)| length + d));
+        chain.taut.clear();
+        chain.taut.extend(displacements.iter().map(|d| d.is_finite()));
+        chain.give = 0.0;
+        chain.assemble(plan, f64::INFINITY);
+        work.descent.here.strains.clone_from(&chain.strains);
+        self.stiffen(displacements, work);
+        let estimates = &mut work.descent.estimates;
+        estimates.tensions.clear();
+        estimates.tensions.resize(displacements.len(), 0.0);
+        estimates.forces.clear();
+    }
+
+    fn stiffen(&self, displacements: &[f64], work: &mut Workspace) {
+        let (plan, count) = (self.plan(), displacements.len());
+        let give = contact_give(plan);
+        let estimates = &mut work.descent.estimates;
+        estimates.give = give;
+        estimates.tendon_give.clear();
+        let own = (0..count).map(|k| (GIVE * work.chain.schur[k * (count + 1)]).max(give));
+        estimates.tendon_give.extend(own);
+    }
+
+    /// From the shape in the descent, with a share of the load there, to the whole.
+    fn climb(
+        &self,
+        displacements: &[f64],
+        from: &[f64],
+        work: &mut Workspace,
+        budget: &mut usize,
+    ) -> Result<(), Fault> {
+        let plan = self.plan();
+        let subsegment = (0..plan.data.len()).map(|i| plan.length(i)).fold(f64::INFINITY, f64::min);
+        let wanted: Vec<f64> =
+            plan.rest_lengths.iter().zip(displacements).map(|(l, d)| l + d).collect();
+        let cold = from.is_empty();
+        let mut stride = if self.scene.obstacles.is_empty() || !cold { 1.0 } else { FIRST };
+        work.load = 0.0;
+        keep(&mut work.kept, &work.descent);
+        while work.load < 1.0 {
+            let next = (work.load + stride).min(1.0);
+            let start = |k: usize| if cold { plan.rest_lengths[k] } else { from[k] };
+            let bounds: Vec<f64> = (0..wanted.len())
+                .map(|k| {
+                    let start = if start(k).is_finite() { start(k) } else { wanted[k] };
+                    if wanted[k].is_finite() { start + next * (wanted[k] - start) } else { wanted[k] }
+                })
+                .collect();
+            let around = Surroundings {
+                plan,
+                scene: self.scene,
+                share: if cold { next } else { 1.0 },
+                bounds: &bounds,
+                reach: REACH * subsegment,
+                slip: SLIP * subsegment,
+            };
+            let mut patience = PATIENCE.min(*budget);
+            *budget -= patience;
+            let before = patience;
+            let (ending, left) = work.descent.go(&around, &mut patience)?;
+            *budget += patience;
+            work.left = left;
+            if ending == Ending::Converged {
+                work.load = next;
+                stride *= if before - patience <= EASY { 2.0 } else { 1.0 };
+                keep(&mut work.kept, &work.descent);
+                work.kept.bounds = bounds;
+                self.stiffen(displacements, work);
+                continue;
+            }
+            work.descent.here.strains.clone_from(&work.kept.strains);
+            work.descent.estimates.tensions.clone_from(&work.kept.tensions);
+            work.descent.estimates.forces.clone_from(&work.kept.forces);
+            self.stiffen(displacements, work);
+            stride *= 0.25;
+            if stride < SHORTEST || *budget == 0 {
+                work.ending = if *budget == 0 { Ending::Spent } else { ending };
+                let mut once = 1;
+                let (_, left) = work.descent.go(&around, &mut once)?;
+                work.left = left;
+                return Ok(());
+            }
+        }
+        work.ending = Ending::Converged;
+        Ok(())
+    }
+
+    /// How deep the undeformed robot is in the obstacles.
+    fn sink(&self, work: &mut Workspace) -> Result<(), Fault> {
+        work.sunk = None;
+        let mut frame = Pose::identity();
+        let plan = self.plan();
+        for (disk, points) in self.scene.points.iter().enumerate() {
+            if disk > 0 {
+                frame = frame.compose(&work.chain.ends[disk - 1]);
+            }
+            for point in points {
+                for (o, obstacle) in self.scene.obstacles.iter().enumerate() {
+                    let near = obstacle.nearest(&frame.transform(&point.at))?;
+                    let depth = point.radius - near.distance;
+                    let least = work.sunk.map_or(TOUCH * plan.total_length(), |(d, _, _)| d);
+                    if depth > least {
+                        work.sunk = Some((depth, o, disk));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(&self, work: &mut Workspace, evaluations: usize) -> Report {
+        let plan = self.plan();
+        let base = self.rod.robot.base();
+        let Workspace { state, descent, .. } = work;
+        state.clear();
+        let here = &descent.here;
+        state.frames.extend(here.frames.iter().map(|frame| base.compose(frame)));
+        state.tendon_lengths.resize(plan.rest_lengths.len(), 0.0);
+        let width = plan.unknowns();
+        let rows = here.strains.chunks_exact(plan.width());
+        for (i, ((data, strains), end)) in plan.data.iter().zip(rows).zip(&here.ends).enumerate() {
+            for strain in strains.chunks_exact(width) {
+                state.strains.push(Vector3::new(strain[0], strain[1], strain[2]));
+                state.elongations.extend(strain.get(3));
+                for (c, strain) in strain.iter().enumerate() {
+                    let off = strain - data.rest[c];
+                    state.energy += 0.5 * data.stiffness[c] * off * off * plan.unit;
+                }
+            }
+            for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
+                let length = (end.transform(&piece.to) - piece.from).norm();
+                state.tendon_lengths[piece.tendon] += length;
+            }
+        }
+        state.tensions.extend(here.tensions.iter().map(|tension| tension * plan.unit));
+        let touch = TOUCH * plan.total_length();
+        for entry in &here.entries {
+            if entry.force > 0.0 || entry.gap <= touch {
+                let (disk, p, obstacle, _) = entry.key;
+                let point = &self.scene.points[disk][p];
+                let normal = base.rotation * entry.near.gradient;
+                state.contacts.push(Contact {
+                    disk,
+                    kind: point.kind,
+                    tendon: point.tendon,
+                    obstacle,
+                    point: base.transform(&entry.at),
+                    normal,
+                    gap: entry.gap,
+                    force: normal * (entry.force * plan.unit),
+                });
+            }
+        }
+        let status = match work.ending {
+            Ending::Converged => Status::Converged,
+            Ending::Lost => Status::Infeasible,
+            Ending::Spent => Status::IterationLimit,
+            Ending::Broken => Status::NumericalError,
+        };
+        let iterations = evaluations.saturating_sub(1);
+        Report { status, residual: work.left.worst(), iterations }
+    }
+
+    fn run(
+        &self,
+        work: &mut Workspace,
+        solve: impl FnOnce(&mut Workspace, &mut usize) -> Result<(), Fault>,
+    ) -> Report {
+        let most = self.plan().settings.max_iterations;
+        let mut budget = most;
+        work.fault = None;
+        if let Err(fault) = solve(work, &mut budget) {
+            work.fault = Some(fault);
+            work.ending = Ending::Broken;
+            work.left.moment = f64::NAN;
+        }
+        self.finish(work, most - budget)
+    }
+}
+
+fn keep(kept: &mut Kept, descent: &Descent) {
+    kept.strains.clone_from(&descent.here.strains);
+    kept.tensions.clone_from(&descent.estimates.tensions);
+    kept.forces.clone_from(&descent.estimates.forces);
+}
+
+impl Model for LoadedRod<'_> {
+    type Workspace = Workspace;
+
+    fn robot(&self) -> &Robot {
+        self.rod.robot
+    }
+
+    fn strain_width(&self) -> usize {
+        self.plan().unknowns()
+    }
+
+    fn elements(&self) -> usize {
+        self.plan().settings.elements
+    }
+
+    fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+        Ok(self.run(work, |work, budget| {
+            self.begin(displacements, work);
+            self.sink(work)?;
+            self.climb(displacements, &[], work, budget)
+        }))
+    }
+
+    fn resume(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+        if work.ending != Ending::Converged || work.kept.bounds.len() != displacements.len() {
+            return self.solve(displacements, work);
+        }
+        let from = work.kept.bounds.clone();
+        let report = self.run(work, |work, budget| {
+            self.climb(displacements, &from, work, budget)
+        });
+        if report.status == Status::Converged || work.fault.is_some() {
+            return Ok(report);
+        }
+        self.solve(displacements, work)
+    }
+
+    fn state<'w>(&self, work: &'w Workspace) -> &'w State {
+        &work.state
+    }
+
+    fn take_state(&self, work: Workspace) -> State {
+        work.state
+    }
+
+    fn message(&self, _: &[f64], work: &Workspace) -> String {
+        let mut text = String::new();
+        if let Some(fault) = &work.fault {
+            return format!("an obstacle's function failed: {fault}");
+        }
+        if work.ending != Ending::Converged {
+            text = match work.ending {
+                Ending::Spent => "max_iterations did not suffice".to_owned(),
+                Ending::Broken => "the arithmetic broke down".to_owned(),
+                _ => "no stable shape follows".to_owned(),
+            };
+            text += &format!(" after {:.1} % of the displacements and loads", 1e2 * work.load);
+        }
+        if let Some((depth, obstacle, disk)) = work.sunk {
+            if !text.is_empty() {
+                text += "; ";
+            }
+            text += &format!(
+                "the undeformed robot is {depth:.3e} m deep in obstacles[{obstacle}] at disk {disk}"
+            );
+        }
+        text
+    }
+}

@@ -1,0 +1,96 @@
+//! What surrounds a robot, prepared: obstacles and loads in its base frame, and its points that may touch.
+
+use nalgebra::Vector3;
+
+use super::loads::Loads;
+use crate::error::InvalidInput;
+use crate::lie::Pose;
+use crate::obstacle::Obstacle;
+use crate::robot::Robot;
+use crate::shape::PointKind;
+use crate::rod::plan::Plan;
+
+/// A point of a disk that may touch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    pub(super) at: Vector3<f64>,
+    pub(super) kind: PointKind,
+    pub(super) tendon: Option<usize>,
+    /// Of the body around it \[m\].
+    pub(super) radius: f64,
+}
+
+/// Points of one disk nearer to each other than this share of the disk's size are one.
+const SAME: f64 = 1e-9;
+
+/// Obstacles and loads around a robot.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub(super) obstacles: Vec<Obstacle>,
+    /// Points of each disk, disk 0 without any: it does not move.
+    pub(super) points: Vec<Vec<Point>>,
+    /// Force on every disk's centre and moment on the tip, base frame's axes, in the plan's unit.
+    pub(super) forces: Vec<Vector3<f64>>,
+    pub(super) moment: Vector3<f64>,
+    /// Whether the moment or any force is not zero.
+    pub(super) loaded: bool,
+}
+
+impl Scene {
+    /// Prepares obstacles, loads and a body of a radius around the backbone \[m\], 0 for none, for a robot
+    /// and its plan.
+    ///
+    /// # Errors
+    /// As [`Loads::forces`], and for a radius that is negative or not finite.
+    pub fn new(
+        robot: &Robot,
+        plan: &Plan,
+        obstacles: &[Obstacle],
+        loads: Option<&Loads>,
+        body_radius: f64,
+    ) -> Result<Self, InvalidInput> {
+        if !(body_radius.is_finite() && body_radius >= 0.0) {
+            let got = format!("{body_radius:?}");
+            return Err(InvalidInput::new("body_radius", "0 m or more", got));
+        }
+        let base: Pose = robot.base().inverse();
+        let n = robot.backbone().subsegments();
+        let points = (0..=n).map(|disk| if disk == 0 { vec![] } else { points(robot, disk, body_radius) });
+        let (mut forces, mut moment) = (vec![Vector3::zeros(); n + 1], Vector3::zeros());
+        if let Some(loads) = loads {
+            (forces, moment) = loads.forces(robot)?;
+            for force in &mut forces {
+                *force = base.rotation * *force / plan.unit;
+            }
+            moment = base.rotation * moment / plan.unit;
+        }
+        let loaded = moment != Vector3::zeros() || forces.iter().any(|f| *f != Vector3::zeros());
+        Ok(Self {
+            obstacles: obstacles.iter().map(|obstacle| obstacle.transformed(&base)).collect(),
+            points: points.collect(),
+            forces,
+            moment,
+            loaded,
+        })
+    }
+}
+
+fn points(robot: &Robot, disk: usize, body_radius: f64) -> Vec<Point> {
+    let center = Point {
+        at: Vector3::zeros(),
+        kind: PointKind::Center,
+        tendon: None,
+        radius: body_radius,
+    };
+    let mut all = vec![center];
+    for (k, path) in robot.paths().iter().enumerate().filter(|(_, path)| path.end() >= disk) {
+        let hole = path.holes[disk];
+        let near = SAME * hole.norm();
+        for (kind, at) in [(PointKind::Hole, hole), (PointKind::Mirror, -hole)] {
+            if !all.iter().any(|other| (other.at - at).norm() <= near) {
+                all.push(Point { at, kind, tendon: Some(k), radius: 0.0 });
+            }
+        }
+    }
+    all
+}

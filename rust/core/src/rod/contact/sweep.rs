@@ -1,0 +1,328 @@
+//! Newton's step of a chain whose frames have potentials, in one sweep from the tip and one back.
+//!
+//! With θ the twists that a subsegment's unknowns give all that lies beyond it, Φ and W the sums of curvature and
+//! slope of the potentials there, the Hessian's blocks are `θ_aᵀ M_b θ_b` for a nearer to the base than b, with
+//! `x·M θ = x·Φ θ + ½ W·[x, θ]`: the displacement x of a subsegment's base is all that it knows of the rest.
+//! The elimination is that of a linear-quadratic regulator.
+
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+
+use super::field::{Field, bracket};
+use crate::lie::Pose;
+use crate::lie::so3::hat;
+use crate::rod::plan::Plan;
+use crate::rod::subsegment::{Derivatives, Local, Node};
+use crate::solve::quadratic::{backward, cholesky, dot, forward};
+
+/// A block that is not positive definite gets this share of its stiffness, and more.
+const SHIFT: f64 = 1e-3;
+
+/// What a sweep is made at.
+pub(super) struct At<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) strains: &'a [f64],
+    /// Frame of every disk in the base's.
+    pub(super) frames: &'a [Pose],
+    pub(super) fields: &'a [Field],
+    pub(super) tensions: &'a [f64],
+    pub(super) taut: &'a [bool],
+    /// Compliance of the taut tendons beyond what the rod gives.
+    pub(super) give: &'a [f64],
+}
+
+/// The factored Hessian, the gradient and the step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sweep {
+    local: Local,
+    /// Slope by every unknown.
+    pub(super) gradient: Vec<f64>,
+    /// Largest of it, relative to the stiffness \[rad\].
+    pub(super) moment: f64,
+    /// First block (from the tip) that is not positive definite, with a direction of descent in it.
+    pub(super) unstable: Option<usize>,
+    pub(super) escape: Vec<f64>,
+    pub(super) step: Vec<f64>,
+    twists: Vec<Vector6<f64>>,
+    factors: Vec<f64>,
+    /// `L⁻¹` times the coupling to the base's displacement, six numbers per unknown.
+    coupling: Vec<Vector6<f64>>,
+    /// `L⁻¹` times the gradient, and one column per taut tendon.
+    columns: Vec<Vec<f64>>,
+    rows: Vec<f64>,
+    lengths: Vec<f64>,
+    block: Vec<f64>,
+    taut: Vec<usize>,
+}
+
+impl Sweep {
+    /// Gradient and factors.
+    pub(super) fn factor(&mut self, at: &At<'_>) {
+        match (at.plan.unknowns(), at.plan.settings.elements) {
+            (3, 1) => self.factor_of::<3, true>(at),
+            (3, _) => self.factor_of::<3, false>(at),
+            (_, 1) => self.factor_of::<4, true>(at),
+            _ => self.factor_of::<4, false>(at),
+        }
+    }
+
+    fn factor_of<const D: usize, const ONE: bool>(&mut self, at: &At<'_>) {
+        let plan = at.plan;
+        let size = plan.width();
+        let n = plan.data.len();
+        self.taut.clear();
+        self.taut.extend((0..at.taut.len()).filter(|k| at.taut[*k]));
+        self.gradient.resize(n * size, 0.0);
+        self.factors.resize(n * size * size, 0.0);
+        self.twists.resize(n * size, Vector6::zeros());
+        self.coupling.resize(n * size, Vector6::zeros());
+        self.columns.resize_with(1 + self.taut.len(), Vec::new);
+        self.columns.iter_mut().for_each(|column| column.resize(n * size, 0.0));
+        (self.moment, self.unstable) = (0.0, None);
+        let mut beyond = Field::zero();
+        let mut value = Matrix6::zeros();
+        let mut slopes = vec![Vector6::zeros(); 1 + self.taut.len()];
+        for i in (0..n).rev() {
+            beyond.add(&at.fields[i + 1]);
+            self.differentiate::<D, ONE>(at, i);
+            self.add_fields::<D>(at, i, &beyond);
+            let range = i * size..(i + 1) * size;
+            let twists = &self.twists[range.clone()];
+            let coupling = &mut self.coupling[range.clone()];
+            for ((twist, own), (k, slope)) in
+                twists.iter().zip(&mut *coupling).zip(self.gradient[range.clone()].iter().enumerate())
+            {
+                let data = &plan.data[i];
+                self.moment = self.moment.max(slope.abs() / data.stiffness[k % D]);
+                if slope.is_nan() {
+                    self.moment = f64::NAN;
+                }
+                *own = (beyond.curvature + value) * twist + bracket(&beyond.slope, twist) * 0.5;
+            }
+            let factor = &mut self.factors[i * size * size..(i + 1) * size * size];
+            for a in 0..size {
+                for b in 0..=a {
+                    factor[a * size + b] += twists[a].dot(&(value * twists[b]));
+                }
+            }
+            self.block.clear();
+            self.block.extend_from_slice(factor);
+            if !cholesky(factor, size) {
+                if self.unstable.is_none() {
+                    self.unstable = Some(i);
+                    escape(&self.block, size, &mut self.escape);
+                }
+                raise(factor, &self.block, size, plan.data[i].stiffness[0]);
+            }
+            for a in 0..size {
+                let (before, after) = coupling.split_at_mut(a);
+                let mut own = after[0];
+                for (other, l) in before.iter().zip(&factor[a * size..a * size + a]) {
+                    own -= other * *l;
+                }
+                after[0] = own * factor[a * (size + 1)];
+            }
+            for (j, (column, slope)) in self.columns.iter_mut().zip(&mut slopes).enumerate() {
+                let own = &mut column[range.clone()];
+                if j == 0 {
+                    own.copy_from_slice(&self.gradient[range.clone()]);
+                } else {
+                    own.fill(0.0);
+                    let tendon = self.taut[j - 1];
+                    let pieces = &plan.pieces[plan.starts[i]..plan.starts[i + 1]];
+                    if let Some(p) = pieces.iter().position(|piece| piece.tendon == tendon) {
+                        own.copy_from_slice(&self.rows[p * size..(p + 1) * size]);
+                    }
+                }
+                for (own, twist) in own.iter_mut().zip(twists) {
+                    *own += twist.dot(slope);
+                }
+                forward(factor, size, own);
+                for (own, coupling) in own.iter().zip(&*coupling) {
+                    *slope -= coupling * *own;
+                }
+            }
+            for coupling in &*coupling {
+                value -= coupling * coupling.transpose();
+            }
+        }
+        self.finish(at);
+    }
+
+    /// Energy and tendons of one subsegment, and its twists.
+    fn differentiate<const D: usize, const ONE: bool>(&mut self, at: &At<'_>, i: usize) {
+        let plan = at.plan;
+        let size = plan.width();
+        let data = &plan.data[i];
+        let pieces = &plan.pieces[plan.starts[i]..plan.starts[i + 1]];
+        let strains = &at.strains[i * size..(i + 1) * size];
+        self.rows.resize(pieces.len() * size, 0.0);
+        self.lengths.resize(pieces.len(), 0.0);
+        self.local.place::<D>(plan.settings.subsegment, data, strains);
+        let mut out = Derivatives {
+            gradient: &mut self.gradient[i * size..(i + 1) * size],
+            hessian: &mut self.factors[i * size * size..(i + 1) * size * size],
+            rows: &mut self.rows,
+            lengths: &mut self.lengths,
+        };
+        self.local
+            .differentiate::<D, ONE>(data, pieces, strains, at.tensions, at.taut, &mut out);
+        let (base, tip) = (&at.frames[i], &at.frames[i + 1].translation);
+        let end = self.local.end().translation;
+        for (e, node) in self.local.nodes.iter().enumerate() {
+            for c in 0..D {
+                let (moved, spin) = node.velocity(c, &end);
+                let spin = base.rotation * spin;
+                let moved = base.rotation * moved - spin.cross(tip);
+                self.twists[i * size + D * e + c] =
+                    Vector6::new(spin.x, spin.y, spin.z, moved.x, moved.y, moved.z);
+            }
+        }
+    }
+
+    /// What the potentials beyond add to a subsegment's gradient and Hessian.
+    fn add_fields<const D: usize>(&mut self, at: &At<'_>, i: usize, beyond: &Field) {
+        let size = at.plan.width();
+        let twists = &self.twists[i * size..(i + 1) * size];
+        let gradient = &mut self.gradient[i * size..(i + 1) * size];
+        let hessian = &mut self.factors[i * size * size..(i + 1) * size * size];
+        for (a, twist) in twists.iter().enumerate() {
+            gradient[a] += twist.dot(&beyond.slope);
+            let bent = beyond.curvature * twist;
+            let bracket = bracket(&beyond.slope, twist) * 0.5;
+            for (b, other) in twists[..=a].iter().enumerate() {
+                hessian[a * size + b] += other.dot(&bent);
+                if b / D < a / D {
+                    hessian[a * size + b] += other.dot(&bracket);
+                }
+            }
+        }
+        let base = &at.frames[i];
+        let force = Vector3::new(beyond.slope[3], beyond.slope[4], beyond.slope[5]);
+        let moment = Vector3::new(beyond.slope[0], beyond.slope[1], beyond.slope[2]);
+        for (e, node) in self.local.nodes.iter().enumerate() {
+            let rotation = base.rotation * node.base.rotation;
+            let place = base.transform(&node.end.translation);
+            let about = rotation.tr_mul(&(moment - place.cross(&force)));
+            let own = second::<D>(node, &rotation.tr_mul(&force), &about);
+            for a in 0..D {
+                for b in 0..=a {
+                    hessian[(D * e + a) * size + D * e + b] += own[a][b];
+                }
+            }
+        }
+    }
+
+    /// The step, from what the columns of gradient and tendons have become.
+    fn finish(&mut self, at: &At<'_>) {
+        let count = self.taut.len();
+        let size = at.plan.width();
+        let (gradient, rows) = self.columns.split_at_mut(1);
+        let gradient = &mut gradient[0];
+        let mut schur = vec![0.0; count * count];
+        let mut pulls = vec![0.0; count];
+        for a in 0..count {
+            for b in 0..=a {
+                schur[a * count + b] = dot(&rows[a], &rows[b]);
+            }
+            schur[a * (count + 1)] += at.give[self.taut[a]];
+            pulls[a] = -dot(&rows[a], gradient);
+        }
+        if cholesky(&mut schur, count) {
+            forward(&schur, count, &mut pulls);
+            backward(&schur, count, &mut pulls);
+            for (row, pull) in rows.iter().zip(&pulls) {
+                for (own, entry) in gradient.iter_mut().zip(row) {
+                    *own += pull * entry;
+                }
+            }
+        }
+        self.step.resize(gradient.len(), 0.0);
+        let mut moved = Vector6::zeros();
+        for i in 0..at.plan.data.len() {
+            let range = i * size..(i + 1) * size;
+            let own = &mut self.step[range.clone()];
+            for ((own, z), coupling) in
+                own.iter_mut().zip(&gradient[range.clone()]).zip(&self.coupling[range.clone()])
+            {
+                *own = -(z + coupling.dot(&moved));
+            }
+            backward(&self.factors[i * size * size..(i + 1) * size * size], size, own);
+            for (own, twist) in own.iter().zip(&self.twists[range]) {
+                moved += twist * *own;
+            }
+        }
+    }
+
+    /// Slope of the merit along the step.
+    pub(super) fn descent(&self) -> f64 {
+        dot(&self.gradient, &self.step)
+    }
+}
+
+/// Second derivatives of `W · η` by the unknowns of an element, η the twist that they give its end, in
+/// exponential coordinates: force and moment about its end, in the axes of its base.
+fn second<const D: usize>(
+    node: &Node,
+    force: &Vector3<f64>,
+    moment: &Vector3<f64>,
+) -> [[f64; 4]; 4] {
+    let element = &node.element;
+    let none = Vector3::zeros();
+    let mut block = element.curvature(force, &none, &Matrix3::zeros());
+    // f · (ω × p'): the twist's velocity is not that of the end.
+    let swept = element.spin.transpose() * hat(force).transpose() * element.sweep;
+    block -= (swept + swept.transpose()) * 0.5;
+    block += element.spin_curvature(moment);
+    let mut out = [[0.0; 4]; 4];
+    for a in 0..3 {
+        for b in 0..=a {
+            out[a][b] = block[(a, b)];
+        }
+    }
+    if D == 4 {
+        let stretch = element.stretch();
+        let mixed = element.stretch_slope(force)
+            - element.spin.transpose() * stretch.cross(force) * 0.5;
+        for b in 0..3 {
+            out[3][b] = mixed[b];
+        }
+    }
+    out
+}
+
+/// A direction of negative curvature of a small symmetric matrix: of its least eigenvalue, its largest
+/// component positive.
+fn escape(matrix: &[f64], size: usize, out: &mut Vec<f64>) {
+    let full = nalgebra::DMatrix::from_fn(size, size, |a, b| matrix[a.max(b) * size + a.min(b)]);
+    out.clear();
+    if full.iter().any(|x| !x.is_finite()) {
+        out.resize(size, 0.0);
+        return;
+    }
+    let eigen = full.symmetric_eigen();
+    let least = eigen.eigenvalues.imin();
+    let vector = eigen.eigenvectors.column(least);
+    let sign = vector[vector.iamax()].signum();
+    out.extend(vector.iter().map(|x| x * sign));
+}
+
+#[cold]
+fn raise(factor: &mut [f64], block: &[f64], size: usize, stiffness: f64) {
+    let mut shift = SHIFT * stiffness;
+    loop {
+        factor.copy_from_slice(block);
+        for k in 0..size {
+            factor[k * (size + 1)] += shift;
+        }
+        if cholesky(factor, size) {
+            return;
+        }
+        if shift > 1e12 * stiffness || shift.is_nan() {
+            // Not a number somewhere: the caller sees it in the residual.
+            factor.fill(0.0);
+            (0..size).for_each(|k| factor[k * (size + 1)] = 1.0);
+            return;
+        }
+        shift *= 4.0;
+    }
+}
