@@ -29,6 +29,7 @@ mod pso;
 mod pso_rates;
 mod robot;
 mod rod_common;
+mod rod_continuum;
 mod rod_golden;
 mod rod_oracles;
 mod rod_sensitivity;
