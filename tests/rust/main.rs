@@ -32,6 +32,7 @@ mod rod_common;
 mod rod_continuum;
 mod rod_golden;
 mod rod_oracles;
+mod rod_random;
 mod rod_sensitivity;
 mod solve;
 mod solve_quadratic;

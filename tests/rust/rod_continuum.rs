@@ -1,7 +1,7 @@
 //! The rod against the continuum limit of uniform helices, and its stretch and that of its tendons.
 //!
 //! **The limit.** Many short subsegments make a rod whose strain u(s) (per length, in the frame that moves along)
-//! minimises `½ uᵀKu + Σ T_j ‖e3 + u × r_j + r_j'‖` at every s by itself: r_j(s) is the hole, and the norm is the
+//! minimises `½ uᵀKu + Σ T_j ‖e3 + u × r_j + r_j'‖` at every s by itself: `r_j(s)` is the hole, and the norm is the
 //! tendon's length per length of the backbone. Let the holes wind by τ per length, `r(s) = Rz(τs) r(0)`. K is
 //! the same for bending in every direction, so `u(s) = Rz(τs) ū`, where ū minimises the sum at s = 0: a
 //! quadratic and norms of affine functions, strictly convex, three unknowns. With `Q = R Rz(τs)`, `R' = R û` becomes
