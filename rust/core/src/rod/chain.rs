@@ -40,6 +40,8 @@ pub(super) struct Chain {
     /// `L⁻¹ A`, one row per piece.
     pub(super) images: Vec<f64>,
     lengths: Vec<f64>,
+    /// Tendons that the step's program is about.
+    counted: Vec<bool>,
     /// `Σ A H⁻¹ Aᵀ` and the tendons' compliance.
     pub(super) schur: Vec<f64>,
     reduced: Vec<f64>,
@@ -259,12 +261,41 @@ impl Chain {
         self.step.iter().all(|s| s.is_finite())
     }
 
-    /// The step of the tensions.
+    /// The step of the tensions. Slack tendons take part once the step would make them too long: far from
+    /// their bounds they would begin the program where dependent tendons lose all digits.
     fn solve_tensions(&mut self, plan: &Plan, ridge: f64) -> bool {
+        let tendons = self.bounds.len();
+        self.counted.clear();
+        for (k, bound) in self.bounds.iter().enumerate() {
+            let slack = !plan.signed && self.tensions[k] == 0.0 && self.slope[k] <= 0.0;
+            self.counted.push(bound.is_finite() && !slack);
+        }
+        loop {
+            if !self.solve_counted(plan, ridge) {
+                return false;
+            }
+            let mut joined = false;
+            for k in 0..tendons {
+                if self.bounds[k].is_finite() && !self.counted[k] {
+                    let shorter = (0..tendons)
+                        .map(|l| self.schur[k.max(l) * tendons + k.min(l)] * self.pulls[l]);
+                    if self.slope[k] > shorter.sum() {
+                        (self.counted[k], joined) = (true, true);
+                    }
+                }
+            }
+            if !joined {
+                return true;
+            }
+        }
+    }
+
+    /// The same among the tendons that are counted.
+    fn solve_counted(&mut self, plan: &Plan, ridge: f64) -> bool {
         let tendons = self.bounds.len();
         self.pulls.clear();
         self.pulls.resize(tendons, 0.0);
-        let bounded = |k: &usize| self.bounds[*k].is_finite();
+        let bounded = |k: &usize| self.counted[*k];
         let count = (0..tendons).filter(bounded).count();
         let trace: f64 = (0..tendons).filter(bounded).map(|k| self.schur[k * (tendons + 1)]).sum();
         let ridge = ridge * trace + f64::MIN_POSITIVE;
