@@ -31,6 +31,7 @@ mod robot;
 mod rod_common;
 mod rod_continuum;
 mod rod_golden;
+mod rod_invariances;
 mod rod_oracles;
 mod rod_random;
 mod rod_sensitivity;

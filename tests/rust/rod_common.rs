@@ -30,17 +30,24 @@ pub(crate) fn apart(one: &Shape, other: &Shape) -> f64 {
     pairs.fold(0.0, |most, (a, b)| f64::max(most, (a.translation - b.translation).norm()))
 }
 
-/// The shape under given tensions, and the displacements that go with them.
-pub(crate) fn under(robot: &Robot, settings: RodSettings, tensions: &[f64]) -> (Shape, Vec<f64>) {
+/// The shape under given tensions, and the displacements that go with them; none where it does not converge.
+pub(crate) fn try_under(
+    robot: &Robot,
+    settings: RodSettings,
+    tensions: &[f64],
+) -> Option<(Shape, Vec<f64>)> {
     let plan = Plan::new(robot, settings).unwrap();
     let rod = Rod::new(robot, &plan);
     let mut work = Workspace::default();
     let report = rod.solve_tensions(tensions, &mut work).unwrap();
     let shape = rod.result(&[], report, work);
-    assert_eq!(shape.report.status, Status::Converged, "{}", shape.message);
     let lengths = shape.state.tendon_lengths.iter().zip(rod.rest_lengths());
     let displacements = lengths.map(|(length, rest)| length - rest).collect();
-    (shape, displacements)
+    (shape.report.status == Status::Converged).then_some((shape, displacements))
+}
+
+pub(crate) fn under(robot: &Robot, settings: RodSettings, tensions: &[f64]) -> (Shape, Vec<f64>) {
+    try_under(robot, settings, tensions).unwrap()
 }
 
 /// What a robot is made of, as numbers that can be changed.
@@ -98,7 +105,9 @@ impl Recipe {
         let mut tensions: Vec<f64> = self.holes.iter().map(|_| tension()).collect();
         let sum: f64 = tensions.iter().sum();
         if sum > 0.0 {
-            tensions.iter_mut().for_each(|tension| *tension *= total / sum);
+            for tension in &mut tensions {
+                *tension *= total / sum;
+            }
         }
         tensions
     }
