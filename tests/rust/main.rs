@@ -30,6 +30,7 @@ mod pso_rates;
 mod robot;
 mod rod_common;
 mod rod_continuum;
+mod rod_degenerate;
 mod rod_golden;
 mod rod_invariances;
 mod rod_oracles;
