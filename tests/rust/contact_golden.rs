@@ -61,9 +61,11 @@ fn every_case_is_met_at_every_disk() {
         if let Some(forces) = case["contact"].as_array() {
             for (i, disk) in forces.iter().enumerate() {
                 for (j, force) in numbers(&disk.as_array().unwrap()[0]).into_iter().enumerate() {
-                    let own = shape.state.contacts.iter().find(|c| {
-                        c.disk == i + 1 && c.kind as usize == j
-                    });
+                    let own = shape
+                        .state
+                        .contacts
+                        .iter()
+                        .find(|c| c.disk == i + 1 && c.kind as usize == j);
                     let own = own.map_or(0.0, |c| c.force.norm());
                     worst_force = worst_force.max((own - force).abs());
                 }

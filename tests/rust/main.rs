@@ -10,8 +10,8 @@
 mod batch;
 mod common;
 mod constant_curvature;
-mod contact_golden;
 mod constant_curvature_robot;
+mod contact_golden;
 mod inverse;
 mod inverse_bounds;
 mod inverse_common;

@@ -357,6 +357,7 @@ pub(crate) fn _shape(
     };
     let rows = values(&strains)?.chunks_exact(width);
     let state = State {
+        contacts: Vec::new(),
         frames,
         strains: rows.clone().map(|row| Vector3::new(row[0], row[1], row[2])).collect(),
         elongations: if width == 4 { rows.map(|row| row[3]).collect() } else { Vec::new() },

@@ -8,6 +8,7 @@ use super::message::message;
 use super::plan::Plan;
 use super::settings::TendonRule;
 use crate::error::InvalidInput;
+use crate::lie::Pose;
 use crate::model::{Model, Report, State};
 use crate::robot::Robot;
 use crate::status::Status;
@@ -194,43 +195,57 @@ impl<'r> Rod<'r> {
         }
     }
 
-    /// Disk frames and everything else that is reported.
+    /// The solved quantities, and how the solve ended.
     fn report(&self, work: &mut Workspace, evaluations: usize) -> Report {
         let Workspace { state, chain, .. } = work;
-        let plan = self.plan;
-        state.clear();
-        let mut frame = *self.robot.base();
+        write_state(state, self, &chain.strains, &chain.ends, &chain.tensions);
+        told(work.ending, work.left.worst(), evaluations)
+    }
+}
+
+/// Disk frames and everything else that follows from strains, the frames of the subsegments' ends in their base
+/// disks' and tensions.
+pub(super) fn write_state(
+    state: &mut State,
+    rod: &Rod<'_>,
+    strains: &[f64],
+    ends: &[Pose],
+    tensions: &[f64],
+) {
+    let plan = rod.plan;
+    state.clear();
+    let mut frame = *rod.robot.base();
+    state.frames.push(frame);
+    state.tendon_lengths.resize(plan.rest_lengths.len(), 0.0);
+    let rows = strains.chunks_exact(plan.width());
+    for (i, ((data, strains), end)) in plan.data.iter().zip(rows).zip(ends).enumerate() {
+        frame = frame.compose(end);
         state.frames.push(frame);
-        state.tendon_lengths.resize(plan.rest_lengths.len(), 0.0);
-        let width = plan.unknowns();
-        let rows = chain.strains.chunks_exact(plan.width());
-        for (i, ((data, strains), end)) in plan.data.iter().zip(rows).zip(&chain.ends).enumerate() {
-            frame = frame.compose(end);
-            state.frames.push(frame);
-            for strain in strains.chunks_exact(width) {
-                state.strains.push(Vector3::new(strain[0], strain[1], strain[2]));
-                state.elongations.extend(strain.get(3));
-                for (c, strain) in strain.iter().enumerate() {
-                    let off = strain - data.rest[c];
-                    state.energy += 0.5 * data.stiffness[c] * off * off * plan.unit;
-                }
-            }
-            for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
-                let length = (end.transform(&piece.to) - piece.from).norm();
-                state.tendon_lengths[piece.tendon] += length;
+        for strain in strains.chunks_exact(plan.unknowns()) {
+            state.strains.push(Vector3::new(strain[0], strain[1], strain[2]));
+            state.elongations.extend(strain.get(3));
+            for (c, strain) in strain.iter().enumerate() {
+                let off = strain - data.rest[c];
+                state.energy += 0.5 * data.stiffness[c] * off * off * plan.unit;
             }
         }
-        state.tensions.extend(chain.tensions.iter().map(|t| t * plan.unit));
-        let status = match work.ending {
-            Ending::Converged => Status::Converged,
-            Ending::Lost => Status::Infeasible,
-            Ending::Spent => Status::IterationLimit,
-            Ending::Broken => Status::NumericalError,
-        };
-        // The last evaluation finds that there is no step to take.
-        let iterations = evaluations.saturating_sub(1);
-        Report { status, residual: work.left.worst(), iterations }
+        for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
+            let length = (end.transform(&piece.to) - piece.from).norm();
+            state.tendon_lengths[piece.tendon] += length;
+        }
     }
+    state.tensions.extend(tensions.iter().map(|t| t * plan.unit));
+}
+
+/// The outcome of so many evaluations, the last of which finds that there is no step to take.
+pub(super) fn told(ending: Ending, residual: f64, evaluations: usize) -> Report {
+    let status = match ending {
+        Ending::Converged => Status::Converged,
+        Ending::Lost => Status::Infeasible,
+        Ending::Spent => Status::IterationLimit,
+        Ending::Broken => Status::NumericalError,
+    };
+    Report { status, residual, iterations: evaluations.saturating_sub(1) }
 }
 
 impl Model for Rod<'_> {

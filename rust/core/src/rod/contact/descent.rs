@@ -1,12 +1,16 @@
 //! From a shape to the nearest minimum among the obstacles: Newton's method on the augmented Lagrangian.
 
+use nalgebra::Vector3;
+
 use super::field::Field;
 use super::merit::{Estimates, Merit};
 use super::scene::Scene;
 use super::sweep::{At, Sweep};
+use crate::lie::so3;
 use crate::obstacle::Fault;
 use crate::rod::ascent::Ending;
 use crate::rod::plan::Plan;
+use crate::solve::quadratic::dot;
 
 /// No strain moves further in one step \[rad\].
 const STEP: f64 = 0.5;
@@ -16,10 +20,17 @@ const ARMIJO: f64 = 1e-4;
 /// Share of a value that its rounding may be.
 const ROUNDING: f64 = 1e-14;
 /// Compliance of the conditions, as a share of what the rod itself gives at its stiffest.
-pub(super) const GIVE: f64 = 1e-3;
+pub(super) const GIVE: f64 = 1.0;
+/// Every renewal of the estimates makes the conditions stiffer by this.
+const STIFFER: f64 = 0.1;
+const STIFFEST: f64 = 1e4;
+/// Residuals are not asked to be smaller: what stiff conditions make of rounding.
+const ROUGH: f64 = 1e-10;
 /// Estimates are renewed when the shape is this near balance \[rad of the subsegments' stiffness\], and the
 /// more often the nearer they are.
-const LOOSE: f64 = 1e-3;
+const LOOSE: f64 = 1e-1;
+/// Sets of active conditions that are tried for one step.
+const SETS: usize = 8;
 /// A nudge off a saddle \[rad\], and how often.
 const NUDGE: f64 = 1e-2;
 const NUDGES: usize = 6;
@@ -62,8 +73,18 @@ pub(super) struct Descent {
     pub(super) estimates: Estimates,
     sweep: Sweep,
     fields: Vec<Field>,
-    taut: Vec<bool>,
+    /// Tendons with a bound, those that pull and entries that push at the end of the step.
+    bounded: Vec<bool>,
+    pulling: Vec<bool>,
+    active: Vec<bool>,
+    tensions: Vec<f64>,
     gives: Vec<f64>,
+    lengthened: Vec<f64>,
+    /// Slope of the value here, whatever the sets, and the step with the sets of this shape.
+    slope: Vec<f64>,
+    first: Vec<f64>,
+    moment: f64,
+    unstable: Option<usize>,
 }
 
 impl Descent {
@@ -74,33 +95,32 @@ impl Descent {
         around: &Surroundings<'_>,
         budget: &mut usize,
     ) -> Result<(Ending, Left), Fault> {
-        let tolerance = around.plan.settings.tolerance;
+        let tolerance = around.plan.settings.tolerance.max(ROUGH);
         let mut left = Left::default();
-        let (mut loose, mut before) = (LOOSE, f64::INFINITY);
+        let mut loose = LOOSE;
         self.evaluate_here(around)?;
         loop {
             self.factor(around);
             *budget = budget.saturating_sub(1);
-            left = Left { moment: self.sweep.moment, ..self.left(around, left.nudged) };
+            left = Left { moment: self.moment, ..self.left(around, left.nudged) };
             if !left.worst().is_finite() {
                 return Ok((Ending::Broken, left));
             }
             if left.worst() <= tolerance {
-                if self.sweep.unstable.is_none() || left.nudged >= NUDGES {
-                    let stable = self.sweep.unstable.is_none();
+                if self.unstable.is_none() || left.nudged >= NUDGES {
+                    let stable = self.unstable.is_none();
                     return Ok((if stable { Ending::Converged } else { Ending::Lost }, left));
                 }
                 self.nudge(around)?;
                 left.nudged += 1;
-                (loose, before) = (LOOSE, f64::INFINITY);
+                loose = LOOSE;
                 continue;
             }
             if *budget == 0 {
                 return Ok((Ending::Spent, left));
             }
             if left.moment <= loose && left.length > tolerance {
-                self.renew(around, left.length > 0.25 * before);
-                before = left.length;
+                self.renew();
                 loose = (0.1 * loose).max(0.5 * tolerance);
                 self.evaluate_here(around)?;
                 self.factor(around);
@@ -110,7 +130,7 @@ impl Descent {
                 if left.moment > 1e3 * tolerance {
                     return Ok((Ending::Lost, left));
                 }
-                self.renew(around, false);
+                self.renew();
                 self.evaluate_here(around)?;
             }
         }
@@ -121,22 +141,70 @@ impl Descent {
         self.here.evaluate(plan, scene, bounds, share, &self.estimates, reach)
     }
 
+    /// Gradient and step, with those conditions active that are so at the end of the step.
     fn factor(&mut self, around: &Surroundings<'_>) {
-        self.here.fields(around.scene, around.share, self.estimates.give, &mut self.fields);
-        self.taut.clear();
-        self.taut.extend(self.here.tensions.iter().map(|tension| *tension > 0.0));
+        let plan = around.plan;
+        self.bounded.clear();
+        self.bounded.extend(around.bounds.iter().map(|bound| bound.is_finite()));
         self.gives.clear();
-        let own = self.estimates.tendon_give.iter().zip(&around.plan.compliance);
+        let own = self.estimates.tendon_give.iter().zip(&plan.compliance);
         self.gives.extend(own.map(|(give, own)| give + own));
+        self.pulling.clear();
+        self.pulling.extend(self.here.tensions.iter().map(|tension| *tension > 0.0));
+        self.active.clear();
+        self.active.extend(self.here.entries.iter().map(|entry| entry.force > 0.0));
+        self.sweep_once(around);
+        self.slope.clone_from(&self.sweep.gradient);
+        (self.moment, self.unstable) = (self.sweep.moment, self.sweep.unstable);
+        self.first.clone_from(&self.sweep.step);
+        for _ in 0..SETS {
+            if !self.foresee(plan) {
+                return;
+            }
+            self.sweep_once(around);
+        }
+        // The sets go round: the ones of this shape lead down.
+        self.sweep.step.clone_from(&self.first);
+    }
+
+    fn sweep_once(&mut self, around: &Surroundings<'_>) {
+        let give = self.estimates.give;
+        self.here.fields(around.scene, around.share, give, &self.active, &mut self.fields);
+        self.tensions.clear();
+        let pulls = self.here.pulls.iter().zip(&self.pulling);
+        self.tensions.extend(pulls.map(|(pull, on)| if *on { *pull } else { 0.0 }));
         self.sweep.factor(&At {
             plan: around.plan,
             strains: &self.here.strains,
             frames: &self.here.frames,
             fields: &self.fields,
-            tensions: &self.here.tensions,
-            taut: &self.taut,
+            tensions: &self.tensions,
+            taut: &self.bounded,
+            pulling: &self.pulling,
             give: &self.gives,
         });
+    }
+
+    /// Sets of conditions that push or pull at the end of the step, to first order; whether they are others.
+    fn foresee(&mut self, plan: &Plan) -> bool {
+        let mut others = false;
+        for (entry, active) in self.here.entries.iter().zip(&mut self.active) {
+            let moved = &self.sweep.moved[entry.key.0];
+            let spin = Vector3::new(moved[0], moved[1], moved[2]);
+            let velocity = Vector3::new(moved[3], moved[4], moved[5]) + spin.cross(&entry.at);
+            let pushes =
+                entry.push - entry.near.gradient.dot(&velocity) / self.estimates.give > 0.0;
+            others |= pushes != *active;
+            *active = pushes;
+        }
+        self.sweep.lengthen(plan, &mut self.lengthened);
+        for (k, pulling) in self.pulling.iter_mut().enumerate() {
+            let pulls =
+                self.bounded[k] && self.here.pulls[k] + self.lengthened[k] / self.gives[k] > 0.0;
+            others |= pulls != *pulling;
+            *pulling = pulls;
+        }
+        others
     }
 
     /// Violations at this shape: of what the multipliers stand for.
@@ -158,24 +226,27 @@ impl Descent {
         Left { moment: 0.0, length, nudged }
     }
 
-    /// Makes the multipliers the estimates; stiffer conditions where they did not help.
-    fn renew(&mut self, around: &Surroundings<'_>, stiffer: bool) {
+    /// Makes the multipliers the estimates, and the conditions stiffer.
+    fn renew(&mut self) {
         let estimates = &mut self.estimates;
         estimates.tensions.clone_from(&self.here.tensions);
         estimates.forces.clear();
         let pushing = self.here.entries.iter().filter(|entry| entry.force > 0.0);
         estimates.forces.extend(pushing.map(|entry| (entry.key, entry.force)));
-        if stiffer {
-            let least = 1e-3 * contact_give(around.plan);
-            estimates.give = (0.1 * estimates.give).max(least);
-            estimates.tendon_give.iter_mut().for_each(|give| *give = (0.1 * *give).max(1e-12));
+        if estimates.stiffness < STIFFEST {
+            estimates.stiffness /= STIFFER;
+            estimates.give *= STIFFER;
+            estimates.tendon_give.iter_mut().for_each(|give| *give *= STIFFER);
         }
     }
 
     /// Takes as much of the Newton step as lowers the value; false when nothing does.
     fn step(&mut self, around: &Surroundings<'_>) -> Result<bool, Fault> {
+        if dot(&self.slope, &self.sweep.step) > 0.0 {
+            self.sweep.step.clone_from(&self.first);
+        }
+        let slope = dot(&self.slope, &self.sweep.step);
         let longest = self.sweep.step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
-        let slope = self.sweep.descent();
         if slope.is_nan() || longest == 0.0 {
             return Ok(false);
         }
@@ -186,8 +257,10 @@ impl Descent {
             self.there.strains.extend(moved.map(|(own, step)| own + share * step));
             let Surroundings { plan, scene, bounds, share: loads, reach, .. } = *around;
             self.there.evaluate(plan, scene, bounds, loads, &self.estimates, reach)?;
-            let wanted = self.here.value + ARMIJO * share * slope + ROUNDING * self.here.size
-                - self.moment_work(around, share);
+            let wanted = self.here.value
+                + ARMIJO * share * slope
+                + ROUNDING * self.here.size
+                + self.moment_work(around);
             if self.there.value <= wanted && self.passes(around) {
                 std::mem::swap(&mut self.here, &mut self.there);
                 return Ok(true);
@@ -197,15 +270,16 @@ impl Descent {
         Ok(false)
     }
 
-    /// Work that a moment on the tip, which has no potential, does along a share of the step: to be spent.
-    fn moment_work(&self, around: &Surroundings<'_>, _share: f64) -> f64 {
+    /// Work that a moment on the tip, which has no potential, does on the way there.
+    fn moment_work(&self, around: &Surroundings<'_>) -> f64 {
         let moment = around.scene.moment * around.share;
-        if moment.norm_squared() == 0.0 {
+        let (Some(from), Some(to)) = (self.here.frames.last(), self.there.frames.last()) else {
+            return 0.0;
+        };
+        if moment == Vector3::zeros() {
             return 0.0;
         }
-        let (from, to) = (self.here.frames.last(), self.there.frames.last());
-        let (Some(from), Some(to)) = (from, to) else { return 0.0 };
-        -moment.dot(&crate::lie::so3::log(&(to.rotation * from.rotation.transpose())))
+        moment.dot(&so3::log(&(to.rotation * from.rotation.transpose())))
     }
 
     /// Whether no point can have gone through an obstacle: it went through the free space around its two
@@ -221,7 +295,7 @@ impl Descent {
     /// Leaves a saddle.
     fn nudge(&mut self, around: &Surroundings<'_>) -> Result<(), Fault> {
         let size = around.plan.width();
-        if let Some(i) = self.sweep.unstable {
+        if let Some(i) = self.unstable {
             let own = &mut self.here.strains[i * size..(i + 1) * size];
             for (own, escape) in own.iter_mut().zip(&self.sweep.escape) {
                 *own += NUDGE * escape;

@@ -25,8 +25,9 @@ pub(super) struct Entry {
     pub(super) near: Near,
     /// Distance left, the body's radius taken off \[m\].
     pub(super) gap: f64,
-    /// Multiplier, at these estimates.
+    /// Multiplier, at these estimates, and what it would be if contact could pull.
     pub(super) force: f64,
+    pub(super) push: f64,
 }
 
 /// A shape and what it is worth.
@@ -43,6 +44,8 @@ pub(super) struct Merit {
     /// What tendons are longer than their bounds, elasticity left out \[m\], and their tensions.
     pub(super) over: Vec<f64>,
     pub(super) tensions: Vec<f64>,
+    /// What these would be if tendons could push.
+    pub(super) pulls: Vec<f64>,
     pub(super) value: f64,
     /// Sum of the sizes of what the value is made of: its rounding.
     pub(super) size: f64,
@@ -59,6 +62,8 @@ pub(super) struct Estimates {
     /// Of each tendon and of contacts \[m per unit\].
     pub(super) tendon_give: Vec<f64>,
     pub(super) give: f64,
+    /// How many times stiffer than at first they are.
+    pub(super) stiffness: f64,
 }
 
 impl Estimates {
@@ -85,6 +90,7 @@ impl Merit {
             _ => self.place::<4>(plan, bounds.len()),
         }
         self.tensions.clear();
+        self.pulls.clear();
         for (k, bound) in bounds.iter().enumerate() {
             let give = estimates.tendon_give[k];
             let all = give + plan.compliance[k];
@@ -92,6 +98,7 @@ impl Merit {
             let pull = (give * estimates.tensions[k] + self.over[k]) / all;
             let tension = if bound.is_finite() { pull.max(0.0) } else { 0.0 };
             self.tensions.push(tension);
+            self.pulls.push(pull);
             self.value += 0.5 * all * tension * tension;
             self.size += 0.5 * all * tension * tension;
         }
@@ -147,9 +154,10 @@ impl Merit {
                         let gap = near.distance - point.radius;
                         clear = clear.min(gap);
                         let key = (disk, p, o, near.feature);
-                        let force = (estimates.force(&key) - gap / estimates.give).max(0.0);
+                        let push = estimates.force(&key) - gap / estimates.give;
+                        let force = push.max(0.0);
                         if force > 0.0 || gap < reach {
-                            self.entries.push(Entry { key, at, near: *near, gap, force });
+                            self.entries.push(Entry { key, at, near: *near, gap, force, push });
                         }
                         let worth = 0.5 * estimates.give * force * force;
                         self.value += worth;
@@ -164,8 +172,15 @@ impl Merit {
         Ok(())
     }
 
-    /// Potentials of the disks at this shape.
-    pub(super) fn fields(&self, scene: &Scene, share: f64, give: f64, out: &mut Vec<Field>) {
+    /// Potentials of the disks at this shape, where the entries of `active` push and no others.
+    pub(super) fn fields(
+        &self,
+        scene: &Scene,
+        share: f64,
+        give: f64,
+        active: &[bool],
+        out: &mut Vec<Field>,
+    ) {
         out.clear();
         out.resize(self.frames.len(), Field::zero());
         if scene.loaded {
@@ -176,10 +191,10 @@ impl Merit {
                 tip.add_moment(&(scene.moment * -share));
             }
         }
-        for entry in self.entries.iter().filter(|entry| entry.force > 0.0) {
+        for (entry, _) in self.entries.iter().zip(active).filter(|(_, active)| **active) {
             let n = entry.near.gradient;
             let curvature = n * n.transpose() / give - entry.near.hessian * entry.force;
-            out[entry.key.0].add_point(&entry.at, &(n * -entry.force), &curvature);
+            out[entry.key.0].add_point(&entry.at, &(n * -entry.push), &curvature);
         }
     }
 }

@@ -1,7 +1,5 @@
 //! The rod among obstacles and under loads as a forward model.
 
-use nalgebra::Vector3;
-
 use super::descent::{Descent, GIVE, Left, Surroundings, contact_give};
 use super::scene::Scene;
 use crate::error::InvalidInput;
@@ -11,7 +9,7 @@ use crate::obstacle::Fault;
 use crate::robot::Robot;
 use crate::rod::ascent::Ending;
 use crate::rod::chain::Chain;
-use crate::rod::model::Rod;
+use crate::rod::model::{Rod, told, write_state};
 use crate::rod::plan::Plan;
 use crate::rod::settings::TendonRule;
 use crate::shape::Contact;
@@ -25,7 +23,7 @@ const EASY: usize = 10;
 const PATIENCE: usize = 60;
 /// Parts of obstacles within this share of a subsegment are looked at, and points may slip by this share of
 /// one in one step.
-const REACH: f64 = 0.05;
+const REACH: f64 = 0.5;
 const SLIP: f64 = 0.25;
 /// Contacts are listed up to this gap, in shares of the robot's length.
 const TOUCH: f64 = 1e-9;
@@ -112,6 +110,7 @@ impl<'r> LoadedRod<'r> {
         let give = contact_give(plan);
         let estimates = &mut work.descent.estimates;
         estimates.give = give;
+        estimates.stiffness = 1.0;
         estimates.tendon_give.clear();
         let own = (0..count).map(|k| (GIVE * work.chain.schur[k * (count + 1)]).max(give));
         estimates.tendon_give.extend(own);
@@ -139,7 +138,11 @@ impl<'r> LoadedRod<'r> {
             let bounds: Vec<f64> = (0..wanted.len())
                 .map(|k| {
                     let start = if start(k).is_finite() { start(k) } else { wanted[k] };
-                    if wanted[k].is_finite() { start + next * (wanted[k] - start) } else { wanted[k] }
+                    if wanted[k].is_finite() {
+                        start + next * (wanted[k] - start)
+                    } else {
+                        wanted[k]
+                    }
                 })
                 .collect();
             let around = Surroundings {
@@ -208,53 +211,25 @@ impl<'r> LoadedRod<'r> {
         let plan = self.plan();
         let base = self.rod.robot.base();
         let Workspace { state, descent, .. } = work;
-        state.clear();
         let here = &descent.here;
-        state.frames.extend(here.frames.iter().map(|frame| base.compose(frame)));
-        state.tendon_lengths.resize(plan.rest_lengths.len(), 0.0);
-        let width = plan.unknowns();
-        let rows = here.strains.chunks_exact(plan.width());
-        for (i, ((data, strains), end)) in plan.data.iter().zip(rows).zip(&here.ends).enumerate() {
-            for strain in strains.chunks_exact(width) {
-                state.strains.push(Vector3::new(strain[0], strain[1], strain[2]));
-                state.elongations.extend(strain.get(3));
-                for (c, strain) in strain.iter().enumerate() {
-                    let off = strain - data.rest[c];
-                    state.energy += 0.5 * data.stiffness[c] * off * off * plan.unit;
-                }
-            }
-            for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
-                let length = (end.transform(&piece.to) - piece.from).norm();
-                state.tendon_lengths[piece.tendon] += length;
-            }
-        }
-        state.tensions.extend(here.tensions.iter().map(|tension| tension * plan.unit));
+        write_state(state, &self.rod, &here.strains, &here.ends, &here.tensions);
         let touch = TOUCH * plan.total_length();
-        for entry in &here.entries {
-            if entry.force > 0.0 || entry.gap <= touch {
-                let (disk, p, obstacle, _) = entry.key;
-                let point = &self.scene.points[disk][p];
-                let normal = base.rotation * entry.near.gradient;
-                state.contacts.push(Contact {
-                    disk,
-                    kind: point.kind,
-                    tendon: point.tendon,
-                    obstacle,
-                    point: base.transform(&entry.at),
-                    normal,
-                    gap: entry.gap,
-                    force: normal * (entry.force * plan.unit),
-                });
-            }
+        for entry in here.entries.iter().filter(|e| e.force > 0.0 || e.gap <= touch) {
+            let (disk, p, obstacle, _) = entry.key;
+            let point = &self.scene.points[disk][p];
+            let normal = base.rotation * entry.near.gradient;
+            state.contacts.push(Contact {
+                disk,
+                kind: point.kind,
+                tendon: point.tendon,
+                obstacle,
+                point: base.transform(&entry.at),
+                normal,
+                gap: entry.gap,
+                force: normal * (entry.force * plan.unit),
+            });
         }
-        let status = match work.ending {
-            Ending::Converged => Status::Converged,
-            Ending::Lost => Status::Infeasible,
-            Ending::Spent => Status::IterationLimit,
-            Ending::Broken => Status::NumericalError,
-        };
-        let iterations = evaluations.saturating_sub(1);
-        Report { status, residual: work.left.worst(), iterations }
+        told(work.ending, work.left.worst(), evaluations)
     }
 
     fn run(
@@ -308,9 +283,7 @@ impl Model for LoadedRod<'_> {
             return self.solve(displacements, work);
         }
         let from = work.kept.bounds.clone();
-        let report = self.run(work, |work, budget| {
-            self.climb(displacements, &from, work, budget)
-        });
+        let report = self.run(work, |work, budget| self.climb(displacements, &from, work, budget));
         if report.status == Status::Converged || work.fault.is_some() {
             return Ok(report);
         }
@@ -326,26 +299,24 @@ impl Model for LoadedRod<'_> {
     }
 
     fn message(&self, _: &[f64], work: &Workspace) -> String {
-        let mut text = String::new();
         if let Some(fault) = &work.fault {
             return format!("an obstacle's function failed: {fault}");
         }
+        let mut parts = Vec::new();
         if work.ending != Ending::Converged {
-            text = match work.ending {
-                Ending::Spent => "max_iterations did not suffice".to_owned(),
-                Ending::Broken => "the arithmetic broke down".to_owned(),
-                _ => "no stable shape follows".to_owned(),
+            let end = match work.ending {
+                Ending::Spent => "max_iterations did not suffice",
+                Ending::Broken => "the arithmetic broke down",
+                _ => "no stable shape follows",
             };
-            text += &format!(" after {:.1} % of the displacements and loads", 1e2 * work.load);
+            let load = 1e2 * work.load;
+            parts.push(format!("{end} after {load:.1} % of the displacements and loads"));
         }
         if let Some((depth, obstacle, disk)) = work.sunk {
-            if !text.is_empty() {
-                text += "; ";
-            }
-            text += &format!(
+            parts.push(format!(
                 "the undeformed robot is {depth:.3e} m deep in obstacles[{obstacle}] at disk {disk}"
-            );
+            ));
         }
-        text
+        parts.join("; ")
     }
 }

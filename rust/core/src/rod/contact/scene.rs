@@ -7,8 +7,8 @@ use crate::error::InvalidInput;
 use crate::lie::Pose;
 use crate::obstacle::Obstacle;
 use crate::robot::Robot;
-use crate::shape::PointKind;
 use crate::rod::plan::Plan;
+use crate::shape::PointKind;
 
 /// A point of a disk that may touch.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +55,8 @@ impl Scene {
         }
         let base: Pose = robot.base().inverse();
         let n = robot.backbone().subsegments();
-        let points = (0..=n).map(|disk| if disk == 0 { vec![] } else { points(robot, disk, body_radius) });
+        let points =
+            (0..=n).map(|disk| if disk == 0 { vec![] } else { points(robot, disk, body_radius) });
         let (mut forces, mut moment) = (vec![Vector3::zeros(); n + 1], Vector3::zeros());
         if let Some(loads) = loads {
             (forces, moment) = loads.forces(robot)?;
@@ -76,12 +77,8 @@ impl Scene {
 }
 
 fn points(robot: &Robot, disk: usize, body_radius: f64) -> Vec<Point> {
-    let center = Point {
-        at: Vector3::zeros(),
-        kind: PointKind::Center,
-        tendon: None,
-        radius: body_radius,
-    };
+    let center =
+        Point { at: Vector3::zeros(), kind: PointKind::Center, tendon: None, radius: body_radius };
     let mut all = vec![center];
     for (k, path) in robot.paths().iter().enumerate().filter(|(_, path)| path.end() >= disk) {
         let hole = path.holes[disk];

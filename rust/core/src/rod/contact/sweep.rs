@@ -26,6 +26,8 @@ pub(super) struct At<'a> {
     pub(super) fields: &'a [Field],
     pub(super) tensions: &'a [f64],
     pub(super) taut: &'a [bool],
+    /// Which of them pull; slopes of the lengths are found for the bounded ones.
+    pub(super) pulling: &'a [bool],
     /// Compliance of the taut tendons beyond what the rod gives.
     pub(super) give: &'a [f64],
 }
@@ -48,8 +50,11 @@ pub(super) struct Sweep {
     coupling: Vec<Vector6<f64>>,
     /// `L⁻¹` times the gradient, and one column per taut tendon.
     columns: Vec<Vec<f64>>,
+    /// Slopes of every piece's length.
     rows: Vec<f64>,
     lengths: Vec<f64>,
+    /// First-order displacement of every disk by the step, a twist about the origin.
+    pub(super) moved: Vec<Vector6<f64>>,
     block: Vec<f64>,
     taut: Vec<usize>,
 }
@@ -70,13 +75,15 @@ impl Sweep {
         let size = plan.width();
         let n = plan.data.len();
         self.taut.clear();
-        self.taut.extend((0..at.taut.len()).filter(|k| at.taut[*k]));
+        self.taut.extend((0..at.taut.len()).filter(|k| at.pulling[*k]));
         self.gradient.resize(n * size, 0.0);
         self.factors.resize(n * size * size, 0.0);
         self.twists.resize(n * size, Vector6::zeros());
         self.coupling.resize(n * size, Vector6::zeros());
         self.columns.resize_with(1 + self.taut.len(), Vec::new);
         self.columns.iter_mut().for_each(|column| column.resize(n * size, 0.0));
+        self.rows.resize(plan.pieces.len() * size, 0.0);
+        self.lengths.resize(plan.pieces.len(), 0.0);
         (self.moment, self.unstable) = (0.0, None);
         let mut beyond = Field::zero();
         let mut value = Matrix6::zeros();
@@ -88,8 +95,10 @@ impl Sweep {
             let range = i * size..(i + 1) * size;
             let twists = &self.twists[range.clone()];
             let coupling = &mut self.coupling[range.clone()];
-            for ((twist, own), (k, slope)) in
-                twists.iter().zip(&mut *coupling).zip(self.gradient[range.clone()].iter().enumerate())
+            for ((twist, own), (k, slope)) in twists
+                .iter()
+                .zip(&mut *coupling)
+                .zip(self.gradient[range.clone()].iter().enumerate())
             {
                 let data = &plan.data[i];
                 self.moment = self.moment.max(slope.abs() / data.stiffness[k % D]);
@@ -130,6 +139,7 @@ impl Sweep {
                     let tendon = self.taut[j - 1];
                     let pieces = &plan.pieces[plan.starts[i]..plan.starts[i + 1]];
                     if let Some(p) = pieces.iter().position(|piece| piece.tendon == tendon) {
+                        let p = plan.starts[i] + p;
                         own.copy_from_slice(&self.rows[p * size..(p + 1) * size]);
                     }
                 }
@@ -155,17 +165,15 @@ impl Sweep {
         let data = &plan.data[i];
         let pieces = &plan.pieces[plan.starts[i]..plan.starts[i + 1]];
         let strains = &at.strains[i * size..(i + 1) * size];
-        self.rows.resize(pieces.len() * size, 0.0);
-        self.lengths.resize(pieces.len(), 0.0);
+        let range = plan.starts[i]..plan.starts[i + 1];
         self.local.place::<D>(plan.settings.subsegment, data, strains);
         let mut out = Derivatives {
             gradient: &mut self.gradient[i * size..(i + 1) * size],
             hessian: &mut self.factors[i * size * size..(i + 1) * size * size],
-            rows: &mut self.rows,
-            lengths: &mut self.lengths,
+            rows: &mut self.rows[range.start * size..range.end * size],
+            lengths: &mut self.lengths[range],
         };
-        self.local
-            .differentiate::<D, ONE>(data, pieces, strains, at.tensions, at.taut, &mut out);
+        self.local.differentiate::<D, ONE>(data, pieces, strains, at.tensions, at.taut, &mut out);
         let (base, tip) = (&at.frames[i], &at.frames[i + 1].translation);
         let end = self.local.end().translation;
         for (e, node) in self.local.nodes.iter().enumerate() {
@@ -238,6 +246,8 @@ impl Sweep {
         }
         self.step.resize(gradient.len(), 0.0);
         let mut moved = Vector6::zeros();
+        self.moved.clear();
+        self.moved.push(moved);
         for i in 0..at.plan.data.len() {
             let range = i * size..(i + 1) * size;
             let own = &mut self.step[range.clone()];
@@ -250,12 +260,21 @@ impl Sweep {
             for (own, twist) in own.iter().zip(&self.twists[range]) {
                 moved += twist * *own;
             }
+            self.moved.push(moved);
         }
     }
 
-    /// Slope of the merit along the step.
-    pub(super) fn descent(&self) -> f64 {
-        dot(&self.gradient, &self.step)
+    /// What the step adds to the length of every tendon, to first order.
+    pub(super) fn lengthen(&self, plan: &Plan, out: &mut Vec<f64>) {
+        let size = plan.width();
+        out.clear();
+        out.resize(plan.rest_lengths.len(), 0.0);
+        for i in 0..plan.data.len() {
+            let step = &self.step[i * size..(i + 1) * size];
+            for p in plan.starts[i]..plan.starts[i + 1] {
+                out[plan.pieces[p].tendon] += dot(&self.rows[p * size..(p + 1) * size], step);
+            }
+        }
     }
 }
 
@@ -281,8 +300,8 @@ fn second<const D: usize>(
     }
     if D == 4 {
         let stretch = element.stretch();
-        let mixed = element.stretch_slope(force)
-            - element.spin.transpose() * stretch.cross(force) * 0.5;
+        let mixed =
+            element.stretch_slope(force) - element.spin.transpose() * stretch.cross(force) * 0.5;
         for b in 0..3 {
             out[3][b] = mixed[b];
         }
