@@ -15,6 +15,7 @@ use tdcr::rod::{self, Plan, Rod, Subsegment, TendonRule, Workspace};
 
 use crate::arguments::whole;
 use crate::convert::{float_array, invalid, type_name, values, wrong_shape};
+use crate::forward::Choice;
 use crate::robot::Robot as PyRobot;
 use crate::shape::Shape;
 
@@ -205,9 +206,7 @@ fn under_tensions(
     let report = rod.solve_tensions(tensions, &mut work)?;
     let message = rod.message(&[], &work);
     let state = rod.take_state(work);
-    let rest = rod.rest_lengths();
-    let displacements = state.tendon_lengths.iter().zip(rest).map(|(own, rest)| own - rest);
-    Ok((displacements.collect(), tdcr::Shape { state, report, message }))
+    Ok((rod.displacements(&state), tdcr::Shape { state, report, message }))
 }
 
 /// The solved quantities of a shape that a solve may start from.
@@ -260,5 +259,6 @@ pub(crate) fn _chained_shape(
     let plan = robot.get().rod_plan(settings).map_err(|e| invalid(&e))?;
     let shape = py.detach(|| chained_shape(&Rod::new(core, &plan), flat, row));
     let own = flat[row * tendons..(row + 1) * tendons].to_vec();
-    Ok(Shape::new(robot.get().clone(), "rod", own, shape.map_err(|e| invalid(&e))?))
+    let shape = shape.map_err(|e| invalid(&e))?;
+    Ok(Shape::new(robot.get().clone(), Choice::Rod(settings), own, shape))
 }

@@ -54,6 +54,19 @@ impl<'r> Rod<'r> {
         &self.plan.rest_lengths
     }
 
+    /// Displacements under which a shape has the lengths and tensions that it has: what its tendons are
+    /// longer than at rest, without what tension stretches them \[m\].
+    #[must_use]
+    pub fn displacements(&self, state: &State) -> Vec<f64> {
+        let plan = self.plan;
+        let rows = state.tendon_lengths.iter().zip(&state.tensions);
+        let plans = plan.rest_lengths.iter().zip(&plan.compliance);
+        let change = |((own, tension), (rest, give)): ((&f64, &f64), (&f64, &f64))| {
+            own - give * tension / plan.unit - rest
+        };
+        rows.zip(plans).map(change).collect()
+    }
+
     /// The shape under given tensions, in the unit of the results: displacements are then what it has. A
     /// minimum that rest leads to as the tensions grow together; infeasible beyond where it ends.
     ///
