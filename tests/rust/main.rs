@@ -32,6 +32,7 @@ mod pso_rates;
 mod robot;
 mod rod_golden;
 mod rod_sensitivity;
+mod rod_stopped;
 mod solve;
 mod solve_bounded;
 mod solve_quadratic;

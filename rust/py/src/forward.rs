@@ -1,5 +1,8 @@
 //! `forward` and the engine of `forward_batch`.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -89,7 +92,8 @@ pub(crate) fn forward(
                 return Err(invalid(&InvalidInput::new("start", expected, "one")));
             }
             let start = start.map(|start| rod::start(core, &settings, start)).transpose()?;
-            py.detach(|| rod::solve(core, &*solved.rod_plan(settings)?, load, start))
+            let plan = solved.rod_plan(settings).map_err(|e| invalid(&e))?;
+            rod::run(py, core, &plan, |rod| rod::solve(rod, load, start))?
         }
         (_, Load::Tensions(_)) => return Err(rod_only("tensions", model)),
         _ if start.is_some() => return Err(rod_only("start", model)),
@@ -285,16 +289,17 @@ pub(crate) fn _forward_batch<'py>(
     let solved = match choice {
         Choice::Rod(settings) => {
             let plan = kept.rod_plan(settings).map_err(|e| invalid(&e))?;
-            batch.solve(py, &Rod::new(core, &plan), progress)
+            let rod = |stop| Rod::new(core, &plan).stopped_by(stop);
+            batch.solve(py, rod, progress)
         }
         Choice::Linkage(settings) => {
             let plan = kept.linkage_plan().map_err(|e| invalid(&e))?;
             let model = Linkage::new(core, plan, settings).map_err(|e| invalid(&e))?;
-            batch.solve(py, &model, progress)
+            batch.solve(py, |_| model, progress)
         }
         Choice::ConstantCurvature(settings) => {
             let plan = kept.constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
-            batch.solve(py, &ConstantCurvature::new(core, plan), progress)
+            batch.solve(py, |_| ConstantCurvature::new(core, plan), progress)
         }
     }?;
     let answer = export(py, &fields, solved)?;
@@ -312,16 +317,17 @@ struct Batch<'a> {
 }
 
 impl Batch<'_> {
+    /// Solves all rows with a model that may listen to a stop flag.
     fn solve<M: Model>(
         &self,
         py: Python<'_>,
-        model: &M,
+        model: impl FnOnce(Arc<AtomicBool>) -> M + Send,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Solved> {
         let &Self { displacements, rows, fields, pool, warm } = self;
         let solve = if warm { chain_rows } else { solve_rows };
         let solved = long_call::run(py, progress, |control| {
-            solve(model, displacements, rows, fields, pool, control)
+            solve(&model(Arc::clone(&control.stop)), displacements, rows, fields, pool, control)
         })?;
         // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
         Ok(solved.map_err(|e| invalid(&e))?.unwrap_or_default())

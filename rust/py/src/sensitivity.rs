@@ -73,8 +73,7 @@ pub(crate) fn jacobian(
         Choice::Rod(settings) => {
             let start = start.map(|start| rod::start(&solved.0, &settings, start)).transpose()?;
             let plan = solved.rod_plan(settings).map_err(|e| invalid(&e))?;
-            let columns = py.detach(|| {
-                let rod = Rod::new(&solved.0, &plan);
+            let columns = rod::run(py, &solved.0, &plan, |rod| {
                 let mut work = Workspace::default();
                 let report = match start {
                     Some(start) => rod.solve_from(&start, &displacements, &mut work)?,
@@ -85,7 +84,7 @@ pub(crate) fn jacobian(
                     return Ok(Ok(sensitivity.jacobian(solved.0.tool())));
                 }
                 Ok(Err(rod.result(&displacements, report, work)))
-            });
+            })?;
             match columns.map_err(|e| invalid(&e))? {
                 Ok(matrix) => matrix,
                 Err(shape) => {
@@ -162,13 +161,12 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
         return Err(Shape::not_converged(shape));
     }
     let plan = own.kept_robot().rod_plan(settings).map_err(|e| invalid(&e))?;
-    let at = py.detach(|| {
-        let rod = Rod::new(own.core_robot(), &plan);
+    let at = rod::run(py, own.core_robot(), &plan, |rod| {
         let mut work = Workspace::default();
         // Nothing is left to do there, but for factors and equations.
         rod.solve_from(own.state(), own.given(), &mut work)?;
         Ok(rod.sensitivity(own.given(), &work).linearized())
-    });
+    })?;
     let at = at.map_err(|e: InvalidInput| invalid(&e))?;
     Ok(Sensitivity { shape: shape.clone().unbind(), plan, at })
 }

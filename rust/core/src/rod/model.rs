@@ -1,5 +1,8 @@
 //! The rod as a forward model: from displacements or tensions to results.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::Vector3;
 
 use super::ascent::{Ascent, EASY, Ending};
@@ -34,6 +37,7 @@ pub struct Workspace {
 pub struct Rod<'r> {
     pub(super) robot: &'r Robot,
     pub(super) plan: &'r Plan,
+    stop: Option<Arc<AtomicBool>>,
 }
 
 /// Newton steps per load step, where tensions are given.
@@ -45,7 +49,20 @@ impl<'r> Rod<'r> {
     /// Solves with a plan that was made of this robot.
     #[must_use]
     pub fn new(robot: &'r Robot, plan: &'r Plan) -> Self {
-        Self { robot, plan }
+        Self { robot, plan, stop: None }
+    }
+
+    /// The same, whose solves end soon after the flag is set, with the status of an iteration limit. It is
+    /// looked at once per subsegment.
+    #[must_use]
+    pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
+        Self { stop: Some(stop), ..self }
+    }
+
+    /// Hands the flag to the solve that begins.
+    fn listen(&self, work: &mut Workspace) {
+        work.chain.stop.clone_from(&self.stop);
+        work.part.stop.clone_from(&self.stop);
     }
 
     /// Length of every tendon at rest through this model's elements, which displacements count from \[m\].
@@ -90,6 +107,7 @@ impl<'r> Rod<'r> {
             return Err(InvalidInput::new("tensions", expected, format!("{bad:?}")));
         }
         let mut budget = self.plan.settings.max_iterations;
+        self.listen(work);
         let chain = &mut work.chain;
         chain.rest(self.plan);
         // All free: the lengths are what the tensions make them.
@@ -185,6 +203,7 @@ impl<'r> Rod<'r> {
     fn ascend(&self, displacements: &[f64], work: &mut Workspace) -> usize {
         let plan = self.plan;
         self.bound(displacements, work);
+        self.listen(work);
         if plan.settings.tendons == TendonRule::Proportional {
             return self.solve_pieces(displacements, work);
         }
@@ -209,6 +228,9 @@ impl<'r> Rod<'r> {
 
     /// Disk frames and everything else that is reported.
     fn report(&self, work: &mut Workspace, evaluations: usize) -> Report {
+        if work.ending != Ending::Converged && work.chain.stopped() {
+            work.ending = Ending::Stopped;
+        }
         let Workspace { state, chain, .. } = work;
         let plan = self.plan;
         state.clear();
@@ -237,7 +259,7 @@ impl<'r> Rod<'r> {
         let status = match work.ending {
             Ending::Converged => Status::Converged,
             Ending::Lost => Status::Infeasible,
-            Ending::Spent => Status::IterationLimit,
+            Ending::Spent | Ending::Stopped => Status::IterationLimit,
             Ending::Broken => Status::NumericalError,
         };
         // The last evaluation finds that there is no step to take.
