@@ -32,6 +32,7 @@ from tdcr._core import (
     PsoSettings,
     Robot,
     RodSettings,
+    Sensitivity,
     Shape,
     SignedDistance,
     Sphere,
@@ -39,6 +40,7 @@ from tdcr._core import (
     clearance,
     forward,
     jacobian,
+    sensitivity,
 )
 from tdcr._core import __version__ as __version__
 from tdcr._dexterity import Manipulability, manipulability
@@ -50,6 +52,7 @@ from tdcr._inverse import (
     inverse_solutions,
     track,
 )
+from tdcr._sensitivity import Gradient, Variation
 from tdcr._status import Status
 from tdcr.errors import InvalidInput, NotConverged, TdcrError
 
@@ -60,6 +63,7 @@ __all__ = [
     "Capsule",
     "ConstantCurvatureSettings",
     "Cylinder",
+    "Gradient",
     "HalfSpace",
     "InvalidInput",
     "Inverse",
@@ -73,6 +77,7 @@ __all__ = [
     "PsoSettings",
     "Robot",
     "RodSettings",
+    "Sensitivity",
     "Shape",
     "ShapeBatch",
     "SignedDistance",
@@ -80,6 +85,7 @@ __all__ = [
     "Status",
     "TdcrError",
     "Tendon",
+    "Variation",
     "clearance",
     "constant_curvature",
     "forward",
@@ -91,5 +97,6 @@ __all__ = [
     "manipulability",
     "planar",
     "pso",
+    "sensitivity",
     "track",
 ]

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
+from tdcr._sensitivity import Gradient, Variation
 from tdcr._status import Status
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "PsoSettings",
     "Robot",
     "RodSettings",
+    "Sensitivity",
     "Shape",
     "SignedDistance",
     "Sphere",
@@ -63,6 +65,7 @@ __all__ = [
     "clearance",
     "forward",
     "jacobian",
+    "sensitivity",
 ]
 
 __version__: str
@@ -470,6 +473,8 @@ class Shape:
     @property
     def model(self) -> str: ...
     @property
+    def settings(self) -> RodSettings | LinkageSettings | ConstantCurvatureSettings: ...
+    @property
     def displacements(self) -> _Array: ...
     @property
     def frames(self) -> _Array: ...
@@ -503,6 +508,30 @@ class Shape:
     def units(self) -> str: ...
     def require(self) -> Self: ...
     def plot(self, **options: Any) -> Any: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class Sensitivity:
+    @property
+    def shape(self) -> Shape: ...
+    @property
+    def dependent(self) -> bool: ...
+    def jacobian(self) -> _Array: ...
+    def forward(
+        self,
+        *,
+        displacements: ArrayLike | None = None,
+        rest: ArrayLike | None = None,
+        holes: Sequence[ArrayLike] | None = None,
+        lengths: ArrayLike | None = None,
+        poisson_ratio: float = 0.0,
+    ) -> Variation: ...
+    def adjoint(
+        self, positions: ArrayLike | None = None, moments: ArrayLike | None = None
+    ) -> Gradient: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -579,9 +608,11 @@ def jacobian(
     robot: Robot,
     displacements: ArrayLike,
     *,
-    model: str,
+    model: str = "rod",
     settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None = None,
+    start: Shape | None = None,
 ) -> _Array: ...
+def sensitivity(shape: Shape) -> Sensitivity: ...
 def _fields() -> tuple[str, ...]: ...
 def _forward_batch(
     robot: Robot,
@@ -764,6 +795,7 @@ def _tendon(
 def _shape(
     robot: Robot,
     model: str,
+    settings: RodSettings | LinkageSettings | ConstantCurvatureSettings,
     displacements: ArrayLike,
     frames: ArrayLike,
     strains: ArrayLike,

@@ -43,6 +43,8 @@ def rebuilt(kind: Any, *values: Any) -> Any:
 def _read_only(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         value.flags.writeable = False
+    if isinstance(value, list):
+        return [_read_only(item) for item in value]
     return value
 
 

@@ -4,15 +4,11 @@ import copy
 import doctest
 import inspect
 import pickle
-import signal
-import subprocess
-import sys
-import textwrap
-import time
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from interrupts import assert_interrupts
 
 import tdcr
 from tdcr import _core, planar
@@ -173,30 +169,12 @@ def test_batches_equal_single_targets():
 
 
 def test_ctrl_c_interrupts_a_long_batch():
-    code = """
-        import signal
+    setup = """
         import numpy as np
         from tdcr import planar
-        # A shell's background job starts with SIGINT ignored.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
         targets = np.random.default_rng(0).uniform(-0.2, 0.2, (8_000_000, 2))
-        print("ready", flush=True)
-        try:
-            planar.two_section_batch(0.14, 0.12, targets)
-        except KeyboardInterrupt:
-            print("interrupted", flush=True)
     """
-    command = [sys.executable, "-c", textwrap.dedent(code)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-        time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
-        begin = time.perf_counter()
-        assert process.stdout.readline() == "interrupted\n"
-        # 50 ms between looks at signals; the rest is for a busy machine.
-        assert time.perf_counter() - begin < 2.0
-        assert process.wait(timeout=30) == 0
+    assert_interrupts(setup, "planar.two_section_batch(0.14, 0.12, targets)")
 
 
 def test_inverses_of_many_sections():

@@ -1,14 +1,10 @@
 """The planar inverse by particle swarm, and batches of it, from Python."""
 
 import pickle
-import signal
-import subprocess
-import sys
-import textwrap
-import time
 
 import numpy as np
 import pytest
+from interrupts import assert_interrupts
 
 import tdcr
 from tdcr import planar, pso
@@ -171,30 +167,12 @@ def test_out_of_reach():
     ],
 )
 def test_ctrl_c_interrupts(call):
-    code = f"""
-        import signal
+    setup = """
         import numpy as np
         from tdcr import planar, pso
-        # A shell's background job starts with SIGINT ignored.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
         trunk = planar.PlanarTrunk([0.140, 0.120], 0.010)
-        print("ready", flush=True)
-        try:
-            {call}
-        except KeyboardInterrupt:
-            print("interrupted", flush=True)
     """
-    command = [sys.executable, "-c", textwrap.dedent(code)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-        time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
-        begin = time.perf_counter()
-        assert process.stdout.readline() == "interrupted\n"
-        # 50 ms between looks at signals; the rest is for a busy machine.
-        assert time.perf_counter() - begin < 2.0
-        assert process.wait(timeout=30) == 0
+    assert_interrupts(setup, call)
 
 
 def swarm(*point, trunk=TWO, **options):

@@ -5,7 +5,6 @@ import doctest
 import inspect
 import math
 import pickle
-import signal
 import subprocess
 import sys
 import textwrap
@@ -14,6 +13,7 @@ import time
 
 import numpy as np
 import pytest
+from interrupts import assert_interrupts
 
 import tdcr
 from tdcr import pso
@@ -344,31 +344,13 @@ def test_progress_bar_goes_to_stderr():
     ],
 )
 def test_ctrl_c_interrupts_a_long_swarm(f, vectorized):
-    code = f"""
-        import math, signal, time
+    setup = """
+        import math
         from tdcr import pso
-        # A shell's background job starts with SIGINT ignored.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
         settings = pso.PsoSettings(particles=1000, max_iterations=1_000_000, stagnation=None)
-        print("ready", flush=True)
-        try:
-            pso.minimize({f}, [0.0, 0.0], [1.0, 1.0], settings=settings, vectorized={vectorized})
-        except KeyboardInterrupt:
-            print("interrupted", flush=True)
     """
-    command = [sys.executable, "-c", textwrap.dedent(code)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "ready\n"
-        time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
-        begin = time.perf_counter()
-        assert process.stdout.readline() == "interrupted\n"
-        seconds = time.perf_counter() - begin
-        print(f"interrupted after {seconds * 1e3:.1f} ms")
-        # One call of f between looks at signals; the rest is for a busy machine.
-        assert seconds < 2.0
-        assert process.wait(timeout=30) == 0
+    keywords = f"settings=settings, vectorized={vectorized}"
+    assert_interrupts(setup, f"pso.minimize({f}, [0.0, 0.0], [1.0, 1.0], {keywords})")
 
 
 def test_other_threads_run_meanwhile():

@@ -39,6 +39,7 @@ mod rod_invariances;
 mod rod_oracles;
 mod rod_random;
 mod rod_sensitivity;
+mod rod_stopped;
 mod solve;
 mod solve_bounded;
 mod solve_quadratic;

@@ -1,14 +1,17 @@
 //! `forward` and the engine of `forward_batch`.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use numpy::PyUntypedArrayMethods;
-use pyo3::PyTypeInfo;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
+use pyo3::{IntoPyObjectExt, PyTypeInfo};
 use rayon::ThreadPool;
 
 use tdcr::batch::{Field, Key, Solved, chain_rows, pool, solve_rows};
-use tdcr::constant_curvature::{self, ConstantCurvature, ConstantCurvatureSettings};
+use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings};
 use tdcr::linkage::{Linkage, LinkageSettings};
 use tdcr::model::Model;
 use tdcr::rod::{Rod, RodSettings};
@@ -34,7 +37,7 @@ use crate::shape::Shape;
 /// tensions : array_like, shape (K,), optional
 ///     Tension of each tendon instead, finite and not negative [N, or 1/m^2 in units of EI where
 ///     the backbone's Young's modulus is not given]. Model "rod" only. The displacements of the shape are
-///     then what its tendons have: length minus length at rest.
+///     then those that lead to it: length minus length at rest, without what an elastic tendon stretches.
 /// model : {"rod", "linkage", "constant_curvature"}, optional
 ///     "rod": the least strain energy under frictionless tendons, for any routing, rest shape and number of
 ///     tendons (Mahapatra & Ghosal 2024). The one with tensions.
@@ -89,7 +92,8 @@ pub(crate) fn forward(
                 return Err(invalid(&InvalidInput::new("start", expected, "one")));
             }
             let start = start.map(|start| rod::start(core, &settings, start)).transpose()?;
-            py.detach(|| rod::solve(core, &*solved.rod_plan(settings)?, load, start))
+            let plan = solved.rod_plan(settings).map_err(|e| invalid(&e))?;
+            rod::run(py, core, &plan, |rod| rod::solve(rod, load, start))?
         }
         (_, Load::Tensions(_)) => return Err(rod_only("tensions", model)),
         _ if start.is_some() => return Err(rod_only("start", model)),
@@ -107,7 +111,7 @@ pub(crate) fn forward(
         }
     }
     .map_err(|e| invalid(&e))?;
-    Ok(Shape::new(solved.clone(), model, displacements, shape))
+    Ok(Shape::new(solved.clone(), choice, displacements, shape))
 }
 
 /// What is given: displacements or tensions, not both.
@@ -129,63 +133,16 @@ fn load(
 }
 
 /// An argument that models without forces or starts do not take.
-fn rod_only(argument: &str, model: &str) -> PyErr {
+pub(crate) fn rod_only(argument: &str, model: &str) -> PyErr {
     let got = format!("{argument} for model \"{model}\"");
     invalid(&InvalidInput::new(argument, "none, or model \"rod\"", got))
 }
 
-/// Velocity of the tool point per metre of tendon displacement.
-///
-/// Parameters
-/// ----------
-/// robot : Robot
-/// displacements : array_like, shape (K,)
-///     As for `forward` [m].
-/// model : {"constant_curvature"}
-/// settings : ConstantCurvatureSettings, optional
-///
-/// Returns
-/// -------
-/// ndarray, shape (6, K)
-///     Velocity of the tool point [m/m], then angular velocity [rad/m], world axes. Exact; finite
-///     where the robot is straight. Columns of tendons that do not count (free, or the only, released
-///     one of a segment) are zero: a single tendon moves the tip when it is pulled, not when it is
-///     released.
-///
-/// Raises
-/// ------
-/// InvalidInput
-///     As `forward`, for a model without derivatives, and for displacements that leave a segment no
-///     length or overflow.
-#[pyfunction]
-#[pyo3(signature = (robot, displacements, *, model, settings=None))]
-pub(crate) fn jacobian(
-    py: Python<'_>,
+/// Displacements of one solve.
+pub(crate) fn one_row(
     robot: &Bound<'_, Robot>,
     displacements: &Bound<'_, PyAny>,
-    model: &str,
-    settings: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Py<PyAny>> {
-    let settings = match Choice::new(model, settings)? {
-        Choice::ConstantCurvature(settings) => settings,
-        Choice::Rod(_) | Choice::Linkage(_) => {
-            let expected = "a model with derivatives (\"constant_curvature\")";
-            return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
-        }
-    };
-    let displacements = one_row(robot, displacements)?;
-    let solved = robot.get();
-    solved.0.check_displacements(&displacements).map_err(|e| invalid(&e))?;
-    let plan = solved.constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
-    let matrix = ConstantCurvature::new(&solved.0, plan)
-        .jacobian(&displacements, &mut constant_curvature::Workspace::default())
-        .map_err(|e| invalid(&e))?;
-    // Columns of the transpose are the rows.
-    frozen(py, matrix.transpose().as_slice().to_vec(), &[6, displacements.len()])
-}
-
-/// Displacements of one solve.
-fn one_row(robot: &Bound<'_, Robot>, displacements: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+) -> PyResult<Vec<f64>> {
     let array = float_array("displacements", displacements)?;
     let tendons = robot.get().0.tendons().len();
     match array.shape() {
@@ -211,7 +168,7 @@ fn one_tension_each(robot: &Bound<'_, Robot>, tensions: &Bound<'_, PyAny>) -> Py
 }
 
 /// A model by name with its settings.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Choice {
     Rod(RodSettings),
     Linkage(LinkageSettings),
@@ -219,6 +176,26 @@ pub(crate) enum Choice {
 }
 
 impl Choice {
+    /// Name of the model.
+    pub(crate) const fn model(&self) -> &'static str {
+        match self {
+            Self::Rod(_) => "rod",
+            Self::Linkage(_) => "linkage",
+            Self::ConstantCurvature(_) => "constant_curvature",
+        }
+    }
+
+    /// The settings as Python knows them.
+    pub(crate) fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        match self {
+            Self::Rod(own) => rod::RodSettings(*own).into_bound_py_any(py),
+            Self::Linkage(own) => settings::LinkageSettings(*own).into_bound_py_any(py),
+            Self::ConstantCurvature(own) => {
+                settings::ConstantCurvatureSettings(*own).into_bound_py_any(py)
+            }
+        }
+    }
+
     /// Checks the name, and that the settings are those of this model.
     pub(crate) fn new(model: &str, settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         match model {
@@ -312,16 +289,17 @@ pub(crate) fn _forward_batch<'py>(
     let solved = match choice {
         Choice::Rod(settings) => {
             let plan = kept.rod_plan(settings).map_err(|e| invalid(&e))?;
-            batch.solve(py, &Rod::new(core, &plan), progress)
+            let rod = |stop| Rod::new(core, &plan).stopped_by(stop);
+            batch.solve(py, rod, progress)
         }
         Choice::Linkage(settings) => {
             let plan = kept.linkage_plan().map_err(|e| invalid(&e))?;
             let model = Linkage::new(core, plan, settings).map_err(|e| invalid(&e))?;
-            batch.solve(py, &model, progress)
+            batch.solve(py, |_| model, progress)
         }
         Choice::ConstantCurvature(settings) => {
             let plan = kept.constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
-            batch.solve(py, &ConstantCurvature::new(core, plan), progress)
+            batch.solve(py, |_| ConstantCurvature::new(core, plan), progress)
         }
     }?;
     let answer = export(py, &fields, solved)?;
@@ -339,16 +317,17 @@ struct Batch<'a> {
 }
 
 impl Batch<'_> {
+    /// Solves all rows with a model that may listen to a stop flag.
     fn solve<M: Model>(
         &self,
         py: Python<'_>,
-        model: &M,
+        model: impl FnOnce(Arc<AtomicBool>) -> M + Send,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Solved> {
         let &Self { displacements, rows, fields, pool, warm } = self;
         let solve = if warm { chain_rows } else { solve_rows };
         let solved = long_call::run(py, progress, |control| {
-            solve(model, displacements, rows, fields, pool, control)
+            solve(&model(Arc::clone(&control.stop)), displacements, rows, fields, pool, control)
         })?;
         // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
         Ok(solved.map_err(|e| invalid(&e))?.unwrap_or_default())

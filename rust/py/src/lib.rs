@@ -23,6 +23,7 @@ mod pso;
 mod pso_settings;
 mod robot;
 mod rod;
+mod sensitivity;
 mod settings;
 mod shape;
 mod signed_distance;
@@ -43,7 +44,7 @@ mod _core {
         _arc_frames, _arc_from_displacements, _arc_jacobian, _displacements_from_arc,
     };
     #[pymodule_export]
-    use crate::forward::{_fields, _forward_batch, forward, jacobian};
+    use crate::forward::{_fields, _forward_batch, forward};
     #[pymodule_export]
     use crate::inverse::{_inverse, _inverse_batch, _inverse_solutions};
     #[pymodule_export]
@@ -69,6 +70,8 @@ mod _core {
     use crate::robot::Robot;
     #[pymodule_export]
     use crate::rod::{_chained_shape, RodSettings};
+    #[pymodule_export]
+    use crate::sensitivity::{Sensitivity, jacobian, sensitivity};
     #[pymodule_export]
     use crate::settings::{
         _rust_defaults, ConstantCurvatureSettings, InverseSettings, LinkageSettings,

@@ -1,6 +1,7 @@
 //! The rod model from Python: its settings, and what `forward` does for it alone.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
 
 use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyTypeError;
@@ -15,6 +16,8 @@ use tdcr::rod::{self, Plan, Rod, Subsegment, TendonRule, Workspace};
 
 use crate::arguments::whole;
 use crate::convert::{float_array, invalid, type_name, values, wrong_shape};
+use crate::forward::Choice;
+use crate::long_call;
 use crate::robot::Robot as PyRobot;
 use crate::shape::Shape;
 
@@ -172,22 +175,37 @@ pub(crate) enum Load {
     Tensions(Vec<f64>),
 }
 
-/// Displacements and the shape, found from rest or from an earlier shape.
-pub(crate) fn solve(
+/// Rods with more second derivatives than this may take longer than a second.
+const LONG: usize = 20_000;
+
+/// Runs what solves a rod without the GIL: where Ctrl-C can stop it, if that may take long.
+pub(crate) fn run<T: Send>(
+    py: Python<'_>,
     robot: &Robot,
     plan: &Plan,
+    job: impl FnOnce(&Rod<'_>) -> T + Send,
+) -> PyResult<T> {
+    let rod = Rod::new(robot, plan);
+    if plan.second_derivatives() < LONG {
+        return Ok(py.detach(|| job(&rod)));
+    }
+    long_call::run(py, None, |control| job(&rod.stopped_by(Arc::clone(&control.stop))))
+}
+
+/// Displacements and the shape, found from rest or from an earlier shape.
+pub(crate) fn solve(
+    rod: &Rod<'_>,
     load: Load,
     start: Option<State>,
 ) -> Result<(Vec<f64>, tdcr::Shape), InvalidInput> {
-    let rod = Rod::new(robot, plan);
     match (load, start) {
-        (Load::Tensions(tensions), _) => under_tensions(&rod, &tensions),
+        (Load::Tensions(tensions), _) => under_tensions(rod, &tensions),
         (Load::Displacements(displacements), None) => {
             let shape = rod.shape(&displacements)?;
             Ok((displacements, shape))
         }
         (Load::Displacements(displacements), Some(start)) => {
-            robot.check_displacements(&displacements)?;
+            rod.robot().check_displacements(&displacements)?;
             let mut work = Workspace::default();
             let report = rod.solve_from(&start, &displacements, &mut work)?;
             let shape = rod.result(&displacements, report, work);
@@ -205,9 +223,7 @@ fn under_tensions(
     let report = rod.solve_tensions(tensions, &mut work)?;
     let message = rod.message(&[], &work);
     let state = rod.take_state(work);
-    let rest = rod.rest_lengths();
-    let displacements = state.tendon_lengths.iter().zip(rest).map(|(own, rest)| own - rest);
-    Ok((displacements.collect(), tdcr::Shape { state, report, message }))
+    Ok((rod.displacements(&state), tdcr::Shape { state, report, message }))
 }
 
 /// The solved quantities of a shape that a solve may start from.
@@ -258,7 +274,8 @@ pub(crate) fn _chained_shape(
         return Err(wrong_shape("displacements", &expected, array.shape()));
     }
     let plan = robot.get().rod_plan(settings).map_err(|e| invalid(&e))?;
-    let shape = py.detach(|| chained_shape(&Rod::new(core, &plan), flat, row));
+    let shape = run(py, core, &plan, |rod| chained_shape(rod, flat, row))?;
     let own = flat[row * tendons..(row + 1) * tendons].to_vec();
-    Ok(Shape::new(robot.get().clone(), "rod", own, shape.map_err(|e| invalid(&e))?))
+    let shape = shape.map_err(|e| invalid(&e))?;
+    Ok(Shape::new(robot.get().clone(), Choice::Rod(settings), own, shape))
 }

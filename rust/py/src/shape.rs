@@ -12,6 +12,7 @@ use tdcr::lie::Pose;
 use tdcr::model::{Report, State};
 
 use crate::convert::{Lazy, float_array, frozen, frozen_frames, frozen_points, status, values};
+use crate::forward::Choice;
 use crate::robot::Robot;
 
 /// The shape of a robot, as a forward model found it. A solve that did not converge carries its
@@ -20,7 +21,7 @@ use crate::robot::Robot;
 #[pyclass(frozen, eq, module = "tdcr")]
 pub(crate) struct Shape {
     robot: Robot,
-    model: String,
+    choice: Choice,
     displacements: Vec<f64>,
     core: tdcr::Shape,
     arrays: Arrays,
@@ -41,11 +42,33 @@ struct Arrays {
 impl Shape {
     pub(crate) fn new(
         robot: Robot,
-        model: &str,
+        choice: Choice,
         displacements: Vec<f64>,
         core: tdcr::Shape,
     ) -> Self {
-        Self { robot, model: model.to_owned(), displacements, core, arrays: Arrays::default() }
+        Self { robot, choice, displacements, core, arrays: Arrays::default() }
+    }
+
+    pub(crate) const fn choice(&self) -> Choice {
+        self.choice
+    }
+
+    pub(crate) fn given(&self) -> &[f64] {
+        &self.displacements
+    }
+
+    pub(crate) fn kept_robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// The exception that has it as its result.
+    pub(crate) fn not_converged(slf: &Bound<'_, Self>) -> PyErr {
+        let report = || {
+            let shape = slf.get();
+            let message = format!("{}: {}", shape.core.report.status, shape.core.message);
+            slf.py().import("tdcr.errors")?.getattr("NotConverged")?.call1((message, slf))
+        };
+        report().map_or_else(|error| error, PyErr::from_value)
     }
 
     pub(crate) fn core_robot(&self) -> &tdcr::robot::Robot {
@@ -65,7 +88,7 @@ impl PartialEq for Shape {
     fn eq(&self, other: &Self) -> bool {
         let (a, b) = (&self.core, &other.core);
         self.robot == other.robot
-            && self.model == other.model
+            && self.choice == other.choice
             && same_bits(&self.displacements, &other.displacements)
             && a.state.frames == b.state.frames
             && a.state.strains == b.state.strains
@@ -85,12 +108,18 @@ impl Shape {
 
     /// Name of the model that solved it.
     #[getter]
-    pub(crate) fn model(&self) -> &str {
-        &self.model
+    pub(crate) fn model(&self) -> &'static str {
+        self.choice.model()
+    }
+
+    /// The settings it was solved with: RodSettings, LinkageSettings or ConstantCurvatureSettings.
+    #[getter]
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.choice.settings(py)
     }
 
     /// Tendon displacements, shape (K,) [m]: negative pulls, `inf` is free. Of a shape under given
-    /// tensions, what its tendons have: length minus length at rest.
+    /// tensions, those that lead to it.
     #[getter]
     fn displacements(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         let build = || frozen(py, self.displacements.clone(), &[self.displacements.len()]);
@@ -186,7 +215,7 @@ impl Shape {
 
     /// Whether the solve converged.
     #[getter]
-    fn ok(&self) -> bool {
+    pub(crate) fn ok(&self) -> bool {
         self.core.report.status == Status::Converged
     }
 
@@ -226,10 +255,7 @@ impl Shape {
         if shape.ok() {
             return Ok(slf.clone());
         }
-        let py = slf.py();
-        let message = format!("{}: {}", shape.core.report.status, shape.core.message);
-        let error = py.import("tdcr.errors")?.getattr("NotConverged")?.call1((message, slf))?;
-        Err(PyErr::from_value(error))
+        Err(Self::not_converged(slf))
     }
 
     /// Draws the shape with matplotlib (an optional extra: `pip install tdcr[plot]`).
@@ -266,7 +292,7 @@ impl Shape {
         slf.py().import("tdcr._plot")?.getattr("plot_shape")?.call((slf,), options)
     }
 
-    fn __hash__(&self) -> u64 {
+    pub(crate) fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         self.robot.hash(&mut hasher);
         for value in &self.displacements {
@@ -282,7 +308,10 @@ impl Shape {
         let message = if message.is_empty() { String::new() } else { format!(" ({message})") };
         format!(
             "<Shape {status}{message}: tip ({:.6}, {:.6}, {:.6}) m, model {:?}>",
-            tip.x, tip.y, tip.z, self.model
+            tip.x,
+            tip.y,
+            tip.z,
+            self.model()
         )
     }
 
@@ -293,7 +322,8 @@ impl Shape {
         let rebuild = py.import("tdcr._core")?.getattr("_shape")?;
         let state = (
             self.robot.clone(),
-            self.model.clone(),
+            self.model(),
+            self.settings(py)?,
             self.displacements(py)?,
             self.frames(py)?,
             self.strains(py)?,
@@ -329,6 +359,7 @@ pub(crate) fn _rotation_vector(frame: &Bound<'_, PyAny>) -> PyResult<(f64, f64, 
 pub(crate) fn _shape(
     robot: &Bound<'_, Robot>,
     model: &str,
+    settings: &Bound<'_, PyAny>,
     displacements: &Bound<'_, PyAny>,
     frames: &Bound<'_, PyAny>,
     strains: &Bound<'_, PyAny>,
@@ -369,5 +400,6 @@ pub(crate) fn _shape(
     let known = Status::ALL.into_iter().find(|status| status.as_str() == name);
     let status = known.unwrap_or(Status::NumericalError);
     let core = tdcr::Shape { state, report: Report { status, residual, iterations }, message };
-    Ok(Shape::new(robot.get().clone(), model, list("displacements", displacements)?, core))
+    let choice = Choice::new(model, Some(settings))?;
+    Ok(Shape::new(robot.get().clone(), choice, list("displacements", displacements)?, core))
 }

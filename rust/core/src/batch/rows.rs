@@ -1,5 +1,6 @@
 //! Rows of displacements through any model, into one flat column per wanted field.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use nalgebra::Vector3;
@@ -16,8 +17,8 @@ use crate::status::Status;
 /// Stop flag and progress of a long call, shared with the thread that waits for it.
 #[derive(Debug, Default)]
 pub struct Control {
-    /// Set to end the call after the rows in work.
-    pub stop: AtomicBool,
+    /// Set to end the call after the rows in work, or in their midst where the model listens to it too.
+    pub stop: Arc<AtomicBool>,
     /// Rows finished so far.
     pub done: AtomicUsize,
 }

@@ -44,6 +44,8 @@ pub(super) enum Ending {
     Spent,
     /// The arithmetic broke down.
     Broken,
+    /// Another thread wanted no more of it.
+    Stopped,
 }
 
 /// Strains and tensions.

@@ -5,6 +5,9 @@
 //! size of the number of tendons, and the step in the tensions is a small quadratic program: no tension
 //! becomes negative.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use super::plan::Plan;
 use super::subsegment::{Derivatives, Local, ROUNDING};
 use crate::lie::Pose;
@@ -29,6 +32,8 @@ pub(super) struct Chain {
     pub(super) slope: Vec<f64>,
     /// Compliance that all tendons have besides their own \[m per unit of tension\].
     pub(super) give: f64,
+    /// Set by another thread to end the solve.
+    pub(super) stop: Option<Arc<AtomicBool>>,
     /// Steps of the tensions and of the strains.
     pub(super) pulls: Vec<f64>,
     pub(super) step: Vec<f64>,
@@ -94,6 +99,11 @@ impl Chain {
         self.tensions.resize(plan.rest_lengths.len(), 0.0);
     }
 
+    /// Whether the solve is to end.
+    pub(super) fn stopped(&self) -> bool {
+        self.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
+
     /// Derivatives, factors and the Schur complement at the point at hand, and what is left there. Subsegments
     /// that are off balance by more than `balance` \[rad of their own stiffness\] are brought nearer first, each by itself.
     pub(super) fn assemble(&mut self, plan: &Plan, balance: f64) -> Left {
@@ -145,6 +155,13 @@ impl Chain {
         let tendons = self.bounds.len();
         let mut left = Left { stable: true, ..Left::default() };
         for (i, data) in plan.data.iter().enumerate() {
+            if self.stopped() {
+                self.local.place::<D>(kind, data, &self.strains[i * size..(i + 1) * size]);
+                self.ends.push(self.local.end());
+                // Out of evaluations.
+                (left.moment, left.rounds) = (f64::INFINITY, usize::MAX);
+                continue;
+            }
             let (first, last) = (plan.starts[i], plan.starts[i + 1]);
             let pieces = &plan.pieces[first..last];
             let strains = &mut self.strains[i * size..(i + 1) * size];

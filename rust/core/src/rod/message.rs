@@ -10,6 +10,9 @@ pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Workspace) ->
     if work.ending == Ending::Converged {
         return String::new();
     }
+    if work.ending == Ending::Stopped {
+        return "stopped before the end".to_owned();
+    }
     if displacements.is_empty() {
         let text = match work.ending {
             Ending::Spent => "max_iterations did not suffice to reach the tensions",

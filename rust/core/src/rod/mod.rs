@@ -14,5 +14,5 @@ mod subsegment;
 
 pub use model::{Rod, Workspace};
 pub use plan::Plan;
-pub use sensitivity::{Change, Sensitivity, Variation};
+pub use sensitivity::{Change, Linearized, Sensitivity, Variation};
 pub use settings::{RodSettings, Subsegment, TendonRule};

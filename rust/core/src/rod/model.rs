@@ -1,5 +1,8 @@
 //! The rod as a forward model: from displacements or tensions to results.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::Vector3;
 
 use super::ascent::{Ascent, EASY, Ending};
@@ -35,6 +38,7 @@ pub struct Workspace {
 pub struct Rod<'r> {
     pub(super) robot: &'r Robot,
     pub(super) plan: &'r Plan,
+    stop: Option<Arc<AtomicBool>>,
 }
 
 /// Newton steps per load step, where tensions are given.
@@ -46,13 +50,39 @@ impl<'r> Rod<'r> {
     /// Solves with a plan that was made of this robot.
     #[must_use]
     pub fn new(robot: &'r Robot, plan: &'r Plan) -> Self {
-        Self { robot, plan }
+        Self { robot, plan, stop: None }
+    }
+
+    /// The same, whose solves end soon after the flag is set, with the status of an iteration limit. It is
+    /// looked at once per subsegment.
+    #[must_use]
+    pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
+        Self { stop: Some(stop), ..self }
+    }
+
+    /// Hands the flag to the solve that begins.
+    fn listen(&self, work: &mut Workspace) {
+        work.chain.stop.clone_from(&self.stop);
+        work.part.stop.clone_from(&self.stop);
     }
 
     /// Length of every tendon at rest through this model's elements, which displacements count from \[m\].
     #[must_use]
     pub fn rest_lengths(&self) -> &[f64] {
         &self.plan.rest_lengths
+    }
+
+    /// Displacements under which a shape has the lengths and tensions that it has: what its tendons are
+    /// longer than at rest, without what tension stretches them \[m\].
+    #[must_use]
+    pub fn displacements(&self, state: &State) -> Vec<f64> {
+        let plan = self.plan;
+        let rows = state.tendon_lengths.iter().zip(&state.tensions);
+        let plans = plan.rest_lengths.iter().zip(&plan.compliance);
+        let change = |((own, tension), (rest, give)): ((&f64, &f64), (&f64, &f64))| {
+            own - give * tension / plan.unit - rest
+        };
+        rows.zip(plans).map(change).collect()
     }
 
     /// The shape under given tensions, in the unit of the results: displacements are then what it has. A
@@ -78,6 +108,7 @@ impl<'r> Rod<'r> {
             return Err(InvalidInput::new("tensions", expected, format!("{bad:?}")));
         }
         let mut budget = self.plan.settings.max_iterations;
+        self.listen(work);
         let chain = &mut work.chain;
         chain.rest(self.plan);
         // All free: the lengths are what the tensions make them.
@@ -173,6 +204,7 @@ impl<'r> Rod<'r> {
     fn ascend(&self, displacements: &[f64], work: &mut Workspace) -> usize {
         let plan = self.plan;
         self.bound(displacements, work);
+        self.listen(work);
         if plan.settings.tendons == TendonRule::Proportional {
             return self.solve_pieces(displacements, work);
         }
@@ -197,6 +229,9 @@ impl<'r> Rod<'r> {
 
     /// The solved quantities, and how the solve ended.
     fn report(&self, work: &mut Workspace, evaluations: usize) -> Report {
+        if work.ending != Ending::Converged && work.chain.stopped() {
+            work.ending = Ending::Stopped;
+        }
         let Workspace { state, chain, .. } = work;
         write_state(state, self, &chain.strains, &chain.ends, &chain.tensions);
         told(work.ending, work.left.worst(), evaluations)
@@ -242,7 +277,7 @@ pub(super) fn told(ending: Ending, residual: f64, evaluations: usize) -> Report 
     let status = match ending {
         Ending::Converged => Status::Converged,
         Ending::Lost => Status::Infeasible,
-        Ending::Spent => Status::IterationLimit,
+        Ending::Spent | Ending::Stopped => Status::IterationLimit,
         Ending::Broken => Status::NumericalError,
     };
     Report { status, residual, iterations: evaluations.saturating_sub(1) }

@@ -159,6 +159,12 @@ impl Plan {
         if self.settings.axial { 4 } else { 3 }
     }
 
+    /// Second derivatives that an evaluation computes: what it costs, and the memory that it takes.
+    #[must_use]
+    pub fn second_derivatives(&self) -> usize {
+        self.data.len() * self.width() * self.width()
+    }
+
     /// Unknowns of a subsegment.
     pub(super) fn width(&self) -> usize {
         self.unknowns() * self.settings.elements

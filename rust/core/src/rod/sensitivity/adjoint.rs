@@ -1,0 +1,200 @@
+//! Gradients of what a shape is used for, by everything that it was made of.
+
+use nalgebra::{DVector, Vector3, Vector6};
+
+use super::{Change, Line, Sensitivity};
+use crate::rod::settings::TendonRule;
+use crate::rod::subsegment::Local;
+
+impl Sensitivity<'_> {
+    /// Gradient of `Σ positions·(disk centres) + Σ moments·(disk rotations)` by everything, world axes, one
+    /// vector per disk.
+    #[must_use]
+    pub fn adjoint(&self, positions: &[Vector3<f64>], moments: &[Vector3<f64>]) -> Change {
+        match self.plan().unknowns() {
+            3 => self.adjoint_of::<3>(positions, moments),
+            _ => self.adjoint_of::<4>(positions, moments),
+        }
+    }
+
+    fn adjoint_of<const D: usize>(
+        &self,
+        positions: &[Vector3<f64>],
+        moments: &[Vector3<f64>],
+    ) -> Change {
+        let plan = self.plan();
+        let (size, n) = (plan.width(), plan.data.len());
+        let mut out = self.no_change();
+        let mut local = Local::default();
+        let mut right = vec![0.0; self.at.strains.len()];
+        // Force and moment about the world's origin of all that lies beyond.
+        let mut wrench = Vector6::zeros();
+        for i in (0..n).rev() {
+            let at = self.at.frames[i + 1].translation;
+            let moment = moments[i + 1] + at.cross(&positions[i + 1]);
+            wrench += Vector6::new(
+                positions[i + 1].x,
+                positions[i + 1].y,
+                positions[i + 1].z,
+                moment.x,
+                moment.y,
+                moment.z,
+            );
+            let base = &self.at.frames[i];
+            let force: Vector3<f64> = wrench.fixed_rows::<3>(0).into();
+            let about: Vector3<f64> = wrench.fixed_rows::<3>(3).into();
+            let (force, about) = (
+                base.rotation.tr_mul(&force),
+                base.rotation.tr_mul(&(about - base.translation.cross(&force))),
+            );
+            let own = &self.at.strains[i * size..(i + 1) * size];
+            local.prepare::<D>(plan.settings.subsegment, &plan.data[i], own);
+            for (e, node) in local.nodes.iter().enumerate() {
+                let about = about - node.end.translation.cross(&force);
+                for c in 0..D {
+                    right[i * size + D * e + c] =
+                        node.sweep[c].dot(&force) + node.spin[c].dot(&about);
+                }
+            }
+            out.lengths[i] += local.end().translation.dot(&force) / plan.length(i);
+        }
+        let mut lengths = DVector::zeros(self.at.count);
+        self.solve(&mut right, &mut lengths);
+        self.contract::<D>(&right, &lengths, &mut out);
+        out
+    }
+
+    /// Adds `−w·dg − t·d(L − b)` as a gradient by everything.
+    fn contract<const D: usize>(&self, w: &[f64], t: &DVector<f64>, out: &mut Change) {
+        let plan = self.plan();
+        let size = plan.width();
+        let mut local = Local::default();
+        let mut weights = vec![0.0; plan.pieces.len()];
+        let mut whole = vec![0.0; self.at.displacements.len()];
+        for (i, data) in plan.data.iter().enumerate() {
+            let strains = &self.at.strains[i * size..(i + 1) * size];
+            let w = &w[i * size..(i + 1) * size];
+            local.prepare::<D>(plan.settings.subsegment, data, strains);
+            let mut share = 0.0;
+            for (k, w) in w.iter().enumerate() {
+                let c = k % D;
+                let bent = w * data.stiffness[c] * (strains[k] - data.rest[c]);
+                share += if c == 3 { -bent } else { bent };
+                if c == 2 {
+                    out.poisson_ratio += bent / (1.0 + self.poisson_ratio());
+                }
+                if c < 3 {
+                    out.rest[i][c] += w * data.stiffness[c] / plan.settings.elements as f64;
+                }
+            }
+            for p in plan.starts[i]..plan.starts[i + 1] {
+                let piece = &plan.pieces[p];
+                let pull = self.at.equations[p].map_or(0.0, |row| t[row]);
+                let at = Line::new(&local, piece);
+                let by = at.gradient::<D>(&local, w, self.at.tensions[p], pull);
+                out.holes[piece.tendon][i] += by.from;
+                out.holes[piece.tendon][i + 1] += by.to;
+                share += by.share;
+                if self.at.equations[p].is_some() {
+                    self.contract_bound(p, i, pull, &mut weights, &mut whole, out);
+                }
+            }
+            out.lengths[i] += share / plan.length(i);
+        }
+        for (weight, piece) in weights.iter_mut().zip(&plan.pieces) {
+            *weight += whole[piece.tendon];
+        }
+        self.contract_rest::<D>(&weights, out);
+    }
+
+    /// Adds `t·db`: weights of the rest lengths of the pieces, and of the whole tendons.
+    fn contract_bound(
+        &self,
+        p: usize,
+        i: usize,
+        pull: f64,
+        weights: &mut [f64],
+        whole: &mut [f64],
+        out: &mut Change,
+    ) {
+        let plan = self.plan();
+        let k = plan.pieces[p].tendon;
+        let give = plan.compliance[k] / plan.rest_lengths[k] * self.at.tensions[p];
+        match plan.settings.tendons {
+            TendonRule::Sliding if i == 0 => {
+                whole[k] += pull * (1.0 + give);
+                out.displacements[k] += pull;
+            }
+            TendonRule::Sliding => {}
+            TendonRule::Proportional => {
+                let (length, d) = (plan.rest_lengths[k], self.at.displacements[k]);
+                weights[p] += pull * (1.0 + d / length + give);
+                let share = pull * plan.piece_lengths[p] / length;
+                out.displacements[k] += share;
+                whole[k] -= share * d / length;
+            }
+        }
+    }
+
+    /// Adds the gradient of weighted rest lengths of the pieces.
+    fn contract_rest<const D: usize>(&self, weights: &[f64], out: &mut Change) {
+        let plan = self.plan();
+        let mut local = Local::default();
+        for (i, data) in plan.data.iter().enumerate() {
+            let rest = data.rest[..D].repeat(plan.settings.elements);
+            local.prepare::<D>(plan.settings.subsegment, data, &rest);
+            let end = local.end();
+            for p in plan.starts[i]..plan.starts[i + 1] {
+                let piece = &plan.pieces[p];
+                let at = Line::new(&local, piece);
+                let force = at.direction * weights[p];
+                out.holes[piece.tendon][i] -= force;
+                out.holes[piece.tendon][i + 1] += end.rotation.tr_mul(&force);
+                out.lengths[i] += end.translation.dot(&force) / plan.length(i);
+                for node in &local.nodes {
+                    for c in 0..3 {
+                        let velocity = node.velocity(c, &at.point).0;
+                        out.rest[i][c] += velocity.dot(&force) / plan.settings.elements as f64;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Gradient by the holes and by the relative length of the subsegment.
+struct ByPiece {
+    from: Vector3<f64>,
+    to: Vector3<f64>,
+    share: f64,
+}
+
+impl Line {
+    /// Of `−tension w·d(∂L/∂w) − pull dL`.
+    fn gradient<const D: usize>(
+        &self,
+        local: &Local,
+        w: &[f64],
+        tension: f64,
+        pull: f64,
+    ) -> ByPiece {
+        let (u, end) = (self.direction, local.end());
+        let (mut velocity, mut levers, mut share) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+        for (e, node) in local.nodes.iter().enumerate() {
+            let (mut swept, mut spun) = (Vector3::zeros(), Vector3::zeros());
+            for c in 0..D {
+                swept += node.sweep[c] * w[D * e + c];
+                spun += node.spin[c] * w[D * e + c];
+            }
+            velocity += swept + spun.cross(&(self.point - node.end.translation));
+            let by_lever = u.cross(&spun) * -tension;
+            levers += by_lever;
+            share += (end.translation - node.end.translation).dot(&by_lever);
+            share -= tension * u.dot(&swept);
+        }
+        let across = velocity - u * u.dot(&velocity);
+        let by_line = across * (-tension / self.length) - u * pull;
+        share += end.translation.dot(&by_line);
+        ByPiece { from: -by_line, to: end.rotation.tr_mul(&(by_line + levers)), share }
+    }
+}

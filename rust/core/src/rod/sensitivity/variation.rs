@@ -1,0 +1,167 @@
+//! What a change does to a shape.
+
+use nalgebra::{DVector, Vector3};
+
+use super::{Change, Line, Sensitivity, Variation};
+use crate::rod::settings::TendonRule;
+use crate::rod::subsegment::Local;
+
+impl Sensitivity<'_> {
+    /// What a change does to the shape, its sizes those of [`Sensitivity::no_change`].
+    #[must_use]
+    pub fn forward(&self, change: &Change) -> Variation {
+        match self.plan().unknowns() {
+            3 => self.forward_of::<3>(change),
+            _ => self.forward_of::<4>(change),
+        }
+    }
+
+    fn forward_of<const D: usize>(&self, change: &Change) -> Variation {
+        let plan = self.plan();
+        let size = plan.width();
+        let mut local = Local::default();
+        let mut right = vec![0.0; self.at.strains.len()];
+        let mut lengths = DVector::zeros(self.at.count);
+        let rest = self.rest_change::<D>(change);
+        let mut whole = vec![0.0; self.at.displacements.len()];
+        for (piece, change) in plan.pieces.iter().zip(&rest) {
+            whole[piece.tendon] += change;
+        }
+        for (i, data) in plan.data.iter().enumerate() {
+            let strains = &self.at.strains[i * size..(i + 1) * size];
+            local.prepare::<D>(plan.settings.subsegment, data, strains);
+            let share = change.lengths[i] / plan.length(i);
+            let own = &mut right[i * size..(i + 1) * size];
+            let count = plan.settings.elements as f64;
+            for (k, own) in own.iter_mut().enumerate() {
+                let c = k % D;
+                let bent = data.stiffness[c] * (strains[k] - data.rest[c]);
+                *own -= bent * self.stiffness_share(c, share, change.poisson_ratio);
+                if c < 3 {
+                    *own += data.stiffness[c] * change.rest[i][c] / count;
+                }
+            }
+            for p in plan.starts[i]..plan.starts[i + 1] {
+                let piece = &plan.pieces[p];
+                let holes = &change.holes[piece.tendon];
+                let (from, to) = (holes[i], holes[i + 1]);
+                let at = Line::new(&local, piece);
+                let end = local.end();
+                let turned = end.rotation * to;
+                let moved = end.translation * share + turned - from;
+                let direction = (moved - at.direction * at.direction.dot(&moved)) / at.length;
+                for (e, node) in local.nodes.iter().enumerate() {
+                    let lever = at.point - node.end.translation;
+                    let shifted = (end.translation - node.end.translation) * share + turned;
+                    for c in 0..D {
+                        let velocity = node.sweep[c] + node.spin[c].cross(&lever);
+                        let change = node.sweep[c] * share + node.spin[c].cross(&shifted);
+                        let slope = direction.dot(&velocity) + at.direction.dot(&change);
+                        own[D * e + c] -= self.at.tensions[p] * slope;
+                    }
+                }
+                if let Some(row) = self.at.equations[p] {
+                    lengths[row] -= at.direction.dot(&moved);
+                    if plan.settings.tendons == TendonRule::Proportional {
+                        lengths[row] += self.bound_change(p, rest[p], whole[piece.tendon], change);
+                    } else if i == 0 {
+                        let whole = whole[piece.tendon];
+                        lengths[row] += self.bound_change(p, whole, whole, change);
+                    }
+                }
+            }
+        }
+        self.solve(&mut right, &mut lengths);
+        self.variation::<D>(right, &lengths, change)
+    }
+
+    /// Relative change of a stiffness.
+    fn stiffness_share(&self, c: usize, share: f64, poisson_ratio: f64) -> f64 {
+        match c {
+            2 => -share - poisson_ratio / (1.0 + self.poisson_ratio()),
+            3 => share,
+            _ => -share,
+        }
+    }
+
+    /// Change of the bound of an equation, elasticity of the tendon included, for changes of the rest lengths
+    /// of its own part and of the whole tendon.
+    fn bound_change(&self, p: usize, own: f64, whole: f64, change: &Change) -> f64 {
+        let plan = self.plan();
+        let k = plan.pieces[p].tendon;
+        let give = plan.compliance[k] / plan.rest_lengths[k] * self.at.tensions[p];
+        match plan.settings.tendons {
+            TendonRule::Sliding => own * (1.0 + give) + change.displacements[k],
+            TendonRule::Proportional => {
+                let (length, d) = (plan.rest_lengths[k], self.at.displacements[k]);
+                let ratio = (change.displacements[k] - d * whole / length) / length;
+                own * (1.0 + d / length + give) + plan.piece_lengths[p] * ratio
+            }
+        }
+    }
+
+    /// Change of the rest length of every piece.
+    fn rest_change<const D: usize>(&self, change: &Change) -> Vec<f64> {
+        let plan = self.plan();
+        let mut out = Vec::with_capacity(plan.pieces.len());
+        let mut local = Local::default();
+        for (i, data) in plan.data.iter().enumerate() {
+            let rest = data.rest[..D].repeat(plan.settings.elements);
+            local.prepare::<D>(plan.settings.subsegment, data, &rest);
+            let end = local.end();
+            let share = change.lengths[i] / plan.length(i);
+            let turn = change.rest[i] / plan.settings.elements as f64;
+            for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
+                let at = Line::new(&local, piece);
+                let holes = &change.holes[piece.tendon];
+                let mut moved = end.translation * share + end.rotation * holes[i + 1] - holes[i];
+                for node in &local.nodes {
+                    for c in 0..3 {
+                        moved += node.velocity(c, &at.point).0 * turn[c];
+                    }
+                }
+                out.push(at.direction.dot(&moved));
+            }
+        }
+        out
+    }
+
+    fn variation<const D: usize>(
+        &self,
+        strains: Vec<f64>,
+        pulls: &DVector<f64>,
+        change: &Change,
+    ) -> Variation {
+        let plan = self.plan();
+        let size = plan.width();
+        let mut tensions = vec![0.0; self.at.displacements.len()];
+        for p in plan.starts[0]..plan.starts[1] {
+            if let Some(row) = self.at.equations[p] {
+                tensions[plan.pieces[p].tendon] = pulls[row] * plan.unit;
+            }
+        }
+        let (mut velocity, mut spin) = (Vector3::zeros(), Vector3::zeros());
+        let (mut velocities, mut spins) = (vec![velocity], vec![spin]);
+        let mut local = Local::default();
+        for (i, data) in plan.data.iter().enumerate() {
+            let own = &self.at.strains[i * size..(i + 1) * size];
+            local.prepare::<D>(plan.settings.subsegment, data, own);
+            let end = local.end().translation;
+            let mut moved = end * (change.lengths[i] / plan.length(i));
+            let mut turned = Vector3::zeros();
+            for (e, node) in local.nodes.iter().enumerate() {
+                for c in 0..D {
+                    let (v, s) = node.velocity(c, &end);
+                    moved += v * strains[i * size + D * e + c];
+                    turned += s * strains[i * size + D * e + c];
+                }
+            }
+            let rotation = &self.at.frames[i].rotation;
+            velocity += spin.cross(&(rotation * end)) + rotation * moved;
+            spin += rotation * turned;
+            velocities.push(velocity);
+            spins.push(spin);
+        }
+        Variation { strains, tensions, velocities, spins }
+    }
+}
