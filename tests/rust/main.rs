@@ -12,6 +12,7 @@ mod common;
 mod constant_curvature;
 mod constant_curvature_robot;
 mod contact_golden;
+mod design_prebend;
 mod inverse;
 mod inverse_bounds;
 mod inverse_common;

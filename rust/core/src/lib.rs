@@ -30,6 +30,7 @@
 pub mod batch;
 mod bits;
 pub mod constant_curvature;
+pub mod design;
 pub mod error;
 pub mod inverse;
 pub mod lie;

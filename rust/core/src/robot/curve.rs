@@ -32,22 +32,11 @@ pub(super) fn rest_from_curve(
     points: &[Vector3<f64>],
     subsegments: usize,
 ) -> Result<(f64, Vec<Vector3<f64>>), InvalidInput> {
-    if points.len() < 2 {
-        return Err(InvalidInput::new("points", "at least 2 points", points.len()));
-    }
-    if let Some(point) = points.iter().find(|point| !point.iter().all(|x| x.is_finite())) {
-        let got = format!("({}, {}, {})", point.x, point.y, point.z);
-        return Err(InvalidInput::new("points", "finite coordinates [m]", got));
-    }
-    if let Some(i) = points.windows(2).position(|pair| pair[0] == pair[1]) {
-        let got = format!("point {i} twice");
-        return Err(InvalidInput::new("points", "neighbours that differ", got));
-    }
     if subsegments == 0 {
         return Err(InvalidInput::new("subsegments", "at least 1", 0));
     }
-    let spline = Spline::new(points);
-    let length = spline.arc_lengths[points.len() - 1];
+    let spline = Spline::checked(points)?;
+    let length = spline.length();
     let steps = subsegments * TRANSPORT_STEPS;
     let mut place = spline.at_arc_length(0.0);
     let mut frame = first_frame(&place.1);
@@ -100,7 +89,7 @@ fn transport(
 }
 
 /// A cubic spline through points, with the arc length at each of them.
-struct Spline<'p> {
+pub(crate) struct Spline<'p> {
     points: &'p [Vector3<f64>],
     /// Parameter at each point: sum of the chords.
     knots: Vec<f64>,
@@ -110,6 +99,26 @@ struct Spline<'p> {
 }
 
 impl<'p> Spline<'p> {
+    /// Through points that are finite and do not repeat, at least two.
+    pub(crate) fn checked(points: &'p [Vector3<f64>]) -> Result<Self, InvalidInput> {
+        if points.len() < 2 {
+            return Err(InvalidInput::new("points", "at least 2 points", points.len()));
+        }
+        if let Some(point) = points.iter().find(|point| !point.iter().all(|x| x.is_finite())) {
+            let got = format!("({}, {}, {})", point.x, point.y, point.z);
+            return Err(InvalidInput::new("points", "finite coordinates [m]", got));
+        }
+        if let Some(i) = points.windows(2).position(|pair| pair[0] == pair[1]) {
+            let got = format!("point {i} twice");
+            return Err(InvalidInput::new("points", "neighbours that differ", got));
+        }
+        Ok(Self::new(points))
+    }
+
+    pub(crate) fn length(&self) -> f64 {
+        self.arc_lengths[self.points.len() - 1]
+    }
+
     fn new(points: &'p [Vector3<f64>]) -> Self {
         let mut knots = vec![0.0];
         let mut last = 0.0;
@@ -151,7 +160,7 @@ impl<'p> Spline<'p> {
     }
 
     /// Point and unit tangent at an arc length.
-    fn at_arc_length(&self, s: f64) -> (Vector3<f64>, Vector3<f64>) {
+    pub(crate) fn at_arc_length(&self, s: f64) -> (Vector3<f64>, Vector3<f64>) {
         let last = self.points.len() - 2;
         let i = self.arc_lengths.partition_point(|at| *at <= s).saturating_sub(1).min(last);
         let step = self.knots[i + 1] - self.knots[i];

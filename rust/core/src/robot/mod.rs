@@ -7,6 +7,7 @@ mod tendon;
 use nalgebra::{Matrix4, Vector3};
 
 pub use backbone::{Backbone, BackboneSpec};
+pub(crate) use curve::Spline;
 pub use tendon::{PerDisk, Routing, Tendon};
 
 use crate::bits::{Bits, hash_by_bits};
@@ -90,6 +91,15 @@ impl Robot {
             })
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self { backbone, tendons, base, tool, name, tendon_names, paths })
+    }
+
+    /// The same robot with another backbone.
+    ///
+    /// # Errors
+    /// As [`Robot::new`], where the tendons do not fit it.
+    pub fn with_backbone(&self, backbone: Backbone) -> Result<Self, InvalidInput> {
+        let new = Self::new(backbone, self.tendons.clone(), None, None, self.name.clone())?;
+        Ok(Self { base: self.base, tool: self.tool, ..new })
     }
 
     /// Its backbone.

@@ -4,6 +4,7 @@ mod ascent;
 mod chain;
 pub mod contact;
 mod element;
+pub(crate) mod march;
 mod message;
 mod model;
 mod plan;

@@ -19,9 +19,9 @@ pub struct Plan {
     /// The same of every piece.
     pub(super) piece_lengths: Vec<f64>,
     /// What a tendon becomes longer by under one unit of tension \[m\]: 0 for a rigid one.
-    pub(super) compliance: Vec<f64>,
+    pub(crate) compliance: Vec<f64>,
     /// Largest length² over bending stiffness: a tension times this is a load of order 1 for a subsegment.
-    pub(super) slenderness: f64,
+    pub(crate) slenderness: f64,
     /// Multipliers may push, and lengths are equations.
     pub(super) signed: bool,
     /// One plan per subsegment, whose tendons are its pieces, where displacements are proportional.
@@ -150,7 +150,7 @@ impl Plan {
     }
 
     /// Rest length from base to tip \[m\].
-    pub(super) fn total_length(&self) -> f64 {
+    pub(crate) fn total_length(&self) -> f64 {
         (0..self.data.len()).map(|i| self.length(i)).sum()
     }
 

@@ -1,0 +1,68 @@
+//! Places on a curve that a robot's disks can have.
+
+use nalgebra::Vector3;
+
+use crate::error::InvalidInput;
+use crate::lie::{Pose, so3};
+use crate::robot::{Robot, Spline};
+use crate::rod::Subsegment;
+
+/// Bisections of one subsegment's end on the curve.
+const HALVINGS: usize = 60;
+
+/// Wanted places of disks 1 to n on the spline through `points` \[m\], where they can be reached one after the
+/// other from the base frame: at equal chords for links; for arcs, whose tangents go over into each other, at the
+/// ends of arcs that start along the last one's end. The curve is moved to start at the base.
+///
+/// # Errors
+/// `InvalidInput` for fewer than two points, points that are not finite or repeat, or a curve shorter than the
+/// robot.
+pub fn points_on_curve(
+    robot: &Robot,
+    points: &[Vector3<f64>],
+    kind: Subsegment,
+) -> Result<Vec<Vector3<f64>>, InvalidInput> {
+    let spline = Spline::checked(points)?;
+    let base: &Pose = robot.base();
+    let shift = base.translation - points[0];
+    let mut tangent = base.rotation.column(2).into_owned();
+    let (mut place, mut at) = (base.translation, 0.0);
+    let mut out = Vec::with_capacity(robot.backbone().subsegments());
+    for (i, length) in robot.backbone().lengths().iter().enumerate() {
+        // Length of the piece that would end at an arc length of the curve.
+        let needed = |s: f64| {
+            let chord = spline.at_arc_length(s).0 + shift - place;
+            let size = chord.norm();
+            match kind {
+                Subsegment::Link => size,
+                Subsegment::Arc => {
+                    let half = tangent.cross(&chord).norm().atan2(tangent.dot(&chord));
+                    let ratio = if half > 1e-8 { half / half.sin() } else { 1.0 };
+                    size * ratio
+                }
+            }
+        };
+        let (mut low, mut high) = (at, (at + 2.0 * length).min(spline.length()));
+        if needed(high) < *length * (1.0 - 1e-12) {
+            let expected = format!("a curve that reaches disk {}", i + 1);
+            let got = format!("one of {:.6} m", spline.length());
+            return Err(InvalidInput::new("target_positions", expected, got));
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if needed(middle) < *length { low = middle } else { high = middle }
+        }
+        at = 0.5 * (low + high);
+        let next = spline.at_arc_length(at).0 + shift;
+        let chord = next - place;
+        // The tangent at an arc's end is the one at its start, mirrored at the chord.
+        let axis = tangent.cross(&chord);
+        let half = axis.norm().atan2(tangent.dot(&chord));
+        if axis.norm() > 0.0 && kind == Subsegment::Arc {
+            tangent = so3::exp(&(axis.normalize() * (2.0 * half))) * tangent;
+        }
+        place = next;
+        out.push(next);
+    }
+    Ok(out)
+}

@@ -1,0 +1,158 @@
+//! Pre-bent design: round trips, the sphere finger, the same shape by different pulls.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Matrix4, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tdcr::Status;
+use tdcr::design::{PrebendSettings, points_on_curve, prebend};
+use tdcr::model::Model;
+use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
+use tdcr::rod::{Plan, Rod, RodSettings, Subsegment, TendonRule};
+
+fn straightened(robot: &Robot, keep_twist: bool) -> Robot {
+    let mut spec = robot.backbone().spec().clone();
+    if let Some(rest) = &mut spec.rest {
+        for own in rest {
+            *own = Vector3::new(0.0, 0.0, if keep_twist { own.z } else { 0.0 });
+        }
+    }
+    robot.with_backbone(Backbone::new(spec).unwrap()).unwrap()
+}
+
+fn random_robot(draw: &mut ChaCha8Rng) -> Robot {
+    let n = draw.random_range(4..20);
+    let mut spec = BackboneSpec::straight(0.02 * f64::from(n), 1);
+    spec.subsegments = vec![usize::try_from(n).unwrap()];
+    let planar = draw.random::<f64>() < 0.4;
+    let (a, b, phase): (f64, f64, f64) =
+        (draw.random_range(-0.2..0.2), draw.random_range(-0.15..0.15), draw.random_range(0.0..TAU));
+    let rest = (0..n).map(|i| {
+        let s = f64::from(i) / f64::from(n);
+        let bend = a + b * (TAU * s + phase).sin();
+        let angle = if planar { 0.0 } else { phase + 2.0 * s };
+        Vector3::new(-bend * angle.sin(), bend * angle.cos(), 0.0)
+    });
+    spec.rest = Some(rest.collect());
+    let count = if planar { 1 } else { draw.random_range(1..3) };
+    let tendons = (0..count).map(|k| {
+        let start = if planar { 0.0 } else { 1.7 * f64::from(k) + draw.random_range(0.0..1.0) };
+        let mut azimuth = start;
+        let wander = if planar { 0.0 } else { draw.random_range(0.0..0.5) };
+        let azimuths = (0..=n).map(|_| {
+            azimuth += wander * draw.random_range(-0.3..1.0);
+            azimuth
+        });
+        let azimuth = PerDisk::Each(azimuths.collect());
+        Tendon::new(Routing::Angles { azimuth, radius: PerDisk::Same(8e-3) }, None, None, None)
+            .unwrap()
+    });
+    let tendons = tendons.collect();
+    Robot::new(Backbone::new(spec).unwrap(), tendons, None, None, None).unwrap()
+}
+
+#[test]
+fn a_rest_shape_that_was_forgotten_is_designed_back() {
+    let mut draw = ChaCha8Rng::seed_from_u64(1);
+    let (mut solved, mut back, mut worst) = (0, 0, 0.0_f64);
+    for _ in 0..1000 {
+        let robot = random_robot(&mut draw);
+        let length = robot.backbone().total_length();
+        let pulls: Vec<f64> =
+            robot.tendons().iter().map(|_| -length * draw.random_range(0.01..0.05)).collect();
+        let plan = Plan::new(&robot, RodSettings::default()).unwrap();
+        let shape = Rod::new(&robot, &plan).shape(&pulls).unwrap();
+        if shape.report.status != Status::Converged || shape.state.tensions.contains(&0.0) {
+            continue;
+        }
+        solved += 1;
+        let targets: Vec<_> = shape.state.frames[1..].iter().map(|f| f.translation).collect();
+        let settings = PrebendSettings::default();
+        let answer = prebend(&straightened(&robot, true), &targets, &pulls, &settings).unwrap();
+        let off = answer.errors.iter().copied().fold(0.0_f64, f64::max) / length;
+        if answer.status == Status::Converged && off <= 1e-10 {
+            back += 1;
+            worst = worst.max(off);
+        }
+    }
+    println!("{back} of {solved} designed back, to {worst:.1e} of the length");
+    assert!(solved > 900 && back * 1000 >= solved * 999);
+}
+
+/// The paper's finger: 9 subsegments, base 42 mm from the axis, a sphere's centre 110 mm above the base. It
+/// leaves its base upwards along an arc that goes over into a circle of `radius` about the centre.
+fn finger(radius: f64) -> (Robot, Vec<Vector3<f64>>) {
+    let base = Matrix4::new_translation(&Vector3::new(0.042, 0.0, 0.0));
+    let backbone = Backbone::new(BackboneSpec::straight(0.18, 9)).unwrap();
+    let tendon = Tendon::straight(PI, 8e-3).unwrap();
+    let robot = Robot::new(backbone, vec![tendon], Some(&base), None, None).unwrap();
+    let (x, z) = (0.042_f64, 0.11_f64);
+    // Circles that touch from outside: (x + r)² + z² = (r + radius)².
+    let r = (x * x + z * z - radius * radius) / (2.0 * (radius - x));
+    let turn = z.atan2(x + r);
+    let entry = (0..=100).map(|i| {
+        let angle = turn * f64::from(i) / 100.0;
+        Vector3::new(x + r * (1.0 - angle.cos()), 0.0, r * angle.sin())
+    });
+    let around = (1..=200).map(|i| {
+        let angle = -turn + 2.5 * f64::from(i) / 200.0;
+        Vector3::new(radius * angle.cos(), 0.0, z + radius * angle.sin())
+    });
+    (robot, entry.chain(around).collect())
+}
+
+#[test]
+fn the_finger_lies_on_a_circle_around_the_sphere() {
+    for radius in [0.056, 0.064] {
+        for subsegment in Subsegment::ALL {
+            let (robot, curve) = finger(radius);
+            let targets = points_on_curve(&robot, &curve, subsegment).unwrap();
+            let rod = RodSettings { subsegment, ..Default::default() };
+            let settings = PrebendSettings { rod, ..Default::default() };
+            let answer = prebend(&robot, &targets, &[-0.03 * 0.18], &settings).unwrap();
+            assert_eq!(answer.status, Status::Converged, "{}", answer.message);
+            let squared: f64 = answer.errors.iter().map(|e| e * e).sum();
+            println!("{radius} {subsegment:?}: {squared:.1e} m², {} marches", answer.iterations);
+            assert!(squared <= 1e-16);
+        }
+    }
+}
+
+#[test]
+fn different_pulls_need_different_rest_shapes() {
+    let (robot, curve) = finger(0.064);
+    let targets = points_on_curve(&robot, &curve, Subsegment::Arc).unwrap();
+    let mut bends = Vec::new();
+    for share in [0.0, 0.01, 0.02, 0.03, 0.04] {
+        let answer =
+            prebend(&robot, &targets, &[-share * 0.18], &PrebendSettings::default()).unwrap();
+        assert_eq!(answer.status, Status::Converged, "{}", answer.message);
+        bends.push((0..9).map(|i| answer.robot.backbone().rest(i).y).sum::<f64>());
+    }
+    assert!(bends.windows(2).all(|pair| (pair[1] - pair[0]).abs() > 0.05), "{bends:?}");
+}
+
+#[test]
+fn other_settings_are_met_by_descent() {
+    let (robot, curve) = finger(0.064);
+    for (elements, tendons) in [(3, TendonRule::Sliding), (1, TendonRule::Proportional)] {
+        let targets = points_on_curve(&robot, &curve, Subsegment::Arc).unwrap();
+        let rod = RodSettings { elements, tendons, ..Default::default() };
+        let settings = PrebendSettings { rod, tolerance: 1e-3, ..Default::default() };
+        let answer = prebend(&robot, &targets, &[-0.03 * 0.18], &settings).unwrap();
+        println!("{elements} {tendons:?}: {} {:?}", answer.message, answer.errors);
+        assert_eq!(answer.status, Status::Converged, "{}", answer.message);
+    }
+}
+
+#[test]
+fn what_cannot_be_reached_is_said() {
+    let (robot, _) = finger(0.064);
+    let far: Vec<_> = (1..=9).map(|i| Vector3::new(0.05 * f64::from(i), 0.0, 0.1)).collect();
+    let answer = prebend(&robot, &far, &[-0.005], &PrebendSettings::default()).unwrap();
+    assert_ne!(answer.status, Status::Converged);
+    assert!(!answer.message.is_empty());
+    let error = prebend(&robot, &far[1..], &[-0.005], &PrebendSettings::default()).unwrap_err();
+    assert_eq!(error.argument, "target_positions");
+}
