@@ -30,6 +30,7 @@ mod planar_two_section;
 mod pso;
 mod pso_rates;
 mod robot;
+mod rod_crossing;
 mod rod_golden;
 mod rod_sensitivity;
 mod rod_stopped;

@@ -5,6 +5,7 @@ mod chain;
 mod element;
 mod message;
 mod model;
+mod nudge;
 mod plan;
 mod proportional;
 mod sensitivity;
