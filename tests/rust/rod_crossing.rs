@@ -18,10 +18,14 @@ const RADIUS: f64 = 0.01;
 
 /// One tendon through holes at azimuth 0 or pi.
 fn crossing(crossed: &[bool]) -> Robot {
-    let azimuth = crossed.iter().map(|crossed| if *crossed { PI } else { 0.0 }).collect();
+    through(LENGTH, RADIUS, 0.0, crossed)
+}
+
+fn through(length: f64, radius: f64, azimuth: f64, crossed: &[bool]) -> Robot {
+    let azimuth = crossed.iter().map(|crossed| azimuth + if *crossed { PI } else { 0.0 }).collect();
     let routing =
-        Routing::Angles { azimuth: PerDisk::Each(azimuth), radius: PerDisk::Same(RADIUS) };
-    robot(LENGTH, crossed.len() - 1, vec![Tendon::new(routing, None, None, None).unwrap()])
+        Routing::Angles { azimuth: PerDisk::Each(azimuth), radius: PerDisk::Same(radius) };
+    robot(length, crossed.len() - 1, vec![Tendon::new(routing, None, None, None).unwrap()])
 }
 
 fn zigzag(n: usize) -> Robot {
@@ -75,6 +79,28 @@ fn crossing_tendons_pull_into_a_true_minimum() {
             }
         }
     }
+}
+
+#[test]
+fn random_ones_all_pull() {
+    let mut draw = ChaCha8Rng::seed_from_u64(4);
+    let (mut found, all) = (0, 3000);
+    for _ in 0..all {
+        let n = draw.random_range(1..15);
+        let zigzag = draw.random_bool(0.7);
+        let crossed: Vec<_> =
+            (0..=n).map(|i| if zigzag { i % 2 == 1 } else { i > n / 2 }).collect();
+        // Against the distance of the disks.
+        let radius = 10.0_f64.powf(draw.random_range(-1.3..0.2));
+        let robot = through(f64::from(n), radius, draw.random_range(0.0..6.0), &crossed);
+        let plan = Plan::new(&robot, RodSettings::default()).unwrap();
+        let rod = Rod::new(&robot, &plan);
+        let share = 10.0_f64.powf(draw.random_range(-6.0..-1.0));
+        let shape = rod.shape(&[-share * rod.rest_lengths()[0]]).unwrap();
+        found += usize::from(shape.report.status == Status::Converged);
+    }
+    println!("{found} of {all} random crossing tendons converged");
+    assert_eq!(found, all);
 }
 
 #[test]
