@@ -24,10 +24,10 @@ pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Workspace) ->
         let stretch = plan.compliance[k] * state.tensions[k] / plan.unit;
         state.tendon_lengths[k] - stretch - plan.rest_lengths[k] - displacements[k]
     };
-    // A sliding tendon may be slack.
+    // A sliding tendon without tension may be slack.
     let off = |k: usize| match plan.settings.tendons {
-        TendonRule::Sliding => over(k).max(0.0),
-        TendonRule::Proportional => over(k).abs(),
+        TendonRule::Sliding if state.tensions[k] == 0.0 => over(k).max(0.0),
+        _ => over(k).abs(),
     };
     let worst = (0..displacements.len())
         .filter(|k| displacements[*k].is_finite())
