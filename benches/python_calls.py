@@ -93,6 +93,38 @@ def rod_paths() -> None:
         )
 
 
+def derivatives() -> None:
+    """Print derivatives of the rod beside the solve that they belong to."""
+    helical = tdcr.Robot(tdcr.Backbone(0.2, 10), [tdcr.Tendon.helical(0.0, 0.01)])
+    ends = [end for end in (10, 20, 30) for _ in range(3)]
+    places = [2 * np.pi * k / 3 + 0.3 * (k // 3) for k in range(9)]
+    tendons = [tdcr.Tendon(place, 0.01, end=end) for place, end in zip(places, ends, strict=True)]
+    three = tdcr.Robot(tdcr.Backbone(0.3, 30), tendons)
+    free = np.inf
+    pulls = [-0.002, -0.001, free, -0.003, -0.004, free, -0.005, -0.004, free]
+    cases = {
+        "rod, one helical tendon, n = 10": (helical, [-0.004]),
+        "rod, 6 of 9 tendons, n = 30": (three, pulls),
+    }
+    print(f"\n{'[us] per call':34} {'forward':>10} {'jacobian':>10} {'sensitivity':>12}", end="")
+    print(f" {'.jacobian':>10} {'.forward':>10} {'.adjoint':>10}")
+    for name, (trunk, displacements) in cases.items():
+        shape = tdcr.forward(trunk, displacements).require()
+        at = tdcr.sensitivity(shape)
+        weights = np.ones((len(shape.positions), 3))
+        calls: list[Callable[[], object]] = [
+            partial(tdcr.forward, trunk, displacements),
+            partial(tdcr.jacobian, trunk, displacements),
+            partial(tdcr.sensitivity, shape),
+            at.jacobian,
+            partial(at.forward, poisson_ratio=1.0),
+            partial(at.adjoint, weights),
+        ]
+        times = [best(call, 100) * 1e6 for call in calls]
+        print(f"{name:34} {times[0]:10.2f} {times[1]:10.2f} {times[2]:12.2f}", end="")
+        print(f" {times[3]:10.2f} {times[4]:10.2f} {times[5]:10.2f}")
+
+
 def inverses(rng: np.random.Generator) -> None:
     """Inverses of the constant-curvature model, alone and along a path."""
     ends = [10 * (k // 3 + 1) for k in range(9)]
@@ -132,6 +164,7 @@ def main() -> None:
     rod_paths()
     forwards(rng, "linkage", 0.08)
     inverses(rng)
+    derivatives()
 
 
 if __name__ == "__main__":

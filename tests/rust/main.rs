@@ -34,6 +34,7 @@ mod pso_rates;
 mod robot;
 mod rod_common;
 mod rod_continuum;
+mod rod_crossing;
 mod rod_degenerate;
 mod rod_golden;
 mod rod_invariances;

@@ -49,8 +49,8 @@ fn a_flag_that_is_set_ends_every_kind_of_solve() {
 
 #[test]
 fn a_large_solve_ends_within_one_evaluation() {
-    let robot = helix(400);
-    let plan = Plan::new(&robot, RodSettings { elements: 40, ..Default::default() }).unwrap();
+    let robot = helix(200);
+    let plan = Plan::new(&robot, RodSettings { elements: 80, ..Default::default() }).unwrap();
     let stop = Arc::new(AtomicBool::new(false));
     let rod = Rod::new(&robot, &plan).stopped_by(Arc::clone(&stop));
     let (report, waited) = thread::scope(|scope| {

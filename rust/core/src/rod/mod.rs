@@ -7,6 +7,7 @@ mod element;
 pub(crate) mod march;
 mod message;
 mod model;
+mod nudge;
 mod plan;
 mod proportional;
 mod sensitivity;

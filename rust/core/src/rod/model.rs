@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use super::ascent::{Ascent, EASY, Ending};
 use super::chain::{Chain, JUMP, Left};
 use super::message::message;
+use super::nudge;
 use super::plan::Plan;
 use super::settings::TendonRule;
 use crate::error::InvalidInput;
@@ -209,7 +210,8 @@ impl<'r> Rod<'r> {
             return self.solve_pieces(displacements, work);
         }
         let mut budget = plan.settings.max_iterations;
-        (work.ending, work.left) = work.ascent.climb(plan, &mut work.chain, &mut budget);
+        let Workspace { ascent, chain, .. } = work;
+        (work.ending, work.left) = nudge::climb(ascent, plan, chain, &mut budget);
         plan.settings.max_iterations - budget
     }
 

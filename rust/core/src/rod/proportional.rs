@@ -6,6 +6,7 @@
 use super::ascent::Ending;
 use super::chain::{Chain, Left};
 use super::model::{Rod, Workspace};
+use super::nudge;
 use super::plan::Plan;
 
 /// A held tendon stretches when it becomes longer by more than this share of itself.
@@ -58,7 +59,7 @@ impl Rod<'_> {
         for (i, own) in plan.parts.iter().enumerate() {
             work.load_part(plan, i, displacements, &mut part);
             let mut budget = plan.settings.max_iterations;
-            let (ending, left) = work.ascent.climb(own, &mut part, &mut budget);
+            let (ending, left) = nudge::climb(&mut work.ascent, own, &mut part, &mut budget);
             most = most.max(plan.settings.max_iterations - budget);
             if work.ending == Ending::Converged {
                 work.ending = ending;
