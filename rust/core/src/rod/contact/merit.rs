@@ -4,7 +4,7 @@
 //! `max(0, (c T̂ + s) / (c + C))`, C its own compliance, a point that has sunk in by s is pushed with
 //! `max(0, λ̂ + s / c)`. What is minimised is then smooth, and exact once the estimates are the multipliers.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::field::Field;
 use super::scene::Scene;
@@ -28,6 +28,16 @@ pub(super) struct Entry {
     /// Multiplier, at these estimates, and what it would be if contact could pull.
     pub(super) force: f64,
     pub(super) push: f64,
+}
+
+impl Entry {
+    /// What the disks' first-order displacements add to the gap.
+    pub(super) fn closing(&self, moved: &[Vector6<f64>]) -> f64 {
+        let moved = &moved[self.key.0];
+        let spin = Vector3::new(moved[0], moved[1], moved[2]);
+        let velocity = Vector3::new(moved[3], moved[4], moved[5]) + spin.cross(&self.at);
+        self.near.gradient.dot(&velocity)
+    }
 }
 
 /// A shape and what it is worth.

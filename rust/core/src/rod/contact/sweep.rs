@@ -30,6 +30,8 @@ pub(super) struct At<'a> {
     pub(super) pulling: &'a [bool],
     /// Compliance of the taut tendons beyond what the rod gives.
     pub(super) give: &'a [f64],
+    /// Added to the Hessian, in shares of the stiffness.
+    pub(super) shift: f64,
 }
 
 /// The factored Hessian, the gradient and the step.
@@ -112,6 +114,7 @@ impl Sweep {
                 for b in 0..=a {
                     factor[a * size + b] += twists[a].dot(&(value * twists[b]));
                 }
+                factor[a * (size + 1)] += at.shift * plan.data[i].stiffness[a % D];
             }
             self.block.clear();
             self.block.extend_from_slice(factor);
