@@ -91,7 +91,7 @@ pub(super) struct Descent {
     straight: Vec<f64>,
     moment: f64,
     unstable: Option<usize>,
-    /// Direction out of the unstable block.
+    /// Direction out of an unstable shape, its largest component 1.
     escape: Vec<f64>,
     /// Of the Hessian: steps that turned out too long become shorter.
     shift: f64,
@@ -175,8 +175,10 @@ impl Descent {
         self.sweep_once(around);
         self.slope.clone_from(&self.sweep.gradient);
         (self.moment, self.unstable) = (self.sweep.moment, self.sweep.unstable);
-        self.escape.clone_from(&self.sweep.escape);
-        while self.sweep.unstable.is_some() && self.shift < SHIFTS {
+        if self.unstable.is_some() {
+            self.sweep.lead_out(plan, &mut self.escape);
+        }
+        while self.sweep.unstable.is_some() && self.shift <= SHIFTS {
             self.shift = SHIFT.max(CHANGE * self.shift);
             self.sweep_once(around);
         }
@@ -296,7 +298,7 @@ impl Descent {
     /// A shorter step next time if this one was cut, a longer one if not.
     fn relax(&mut self, share: f64, whole: f64) {
         if share < 0.2 * whole {
-            self.shift = SHIFT.max(CHANGE * self.shift);
+            self.shift = SHIFT.max(CHANGE * self.shift).min(SHIFTS);
         } else if share == whole {
             self.shift = if self.shift > SHIFT { self.shift / CHANGE } else { 0.0 };
         }
@@ -371,22 +373,19 @@ impl Descent {
 
     /// Leaves a saddle.
     fn nudge(&mut self, around: &Surroundings<'_>) -> Result<(), Fault> {
-        let size = around.plan.width();
-        if let Some(i) = self.unstable {
-            let own = &mut self.here.strains[i * size..(i + 1) * size];
-            for (own, escape) in own.iter_mut().zip(&self.escape) {
-                *own += NUDGE * escape;
-            }
+        for (own, escape) in self.here.strains.iter_mut().zip(&self.escape) {
+            *own += NUDGE * escape;
         }
         self.evaluate_here(around)
     }
 }
 
-/// Compliance of contacts that is small against what a subsegment gives.
+/// Compliance of contacts: small against what the whole rod gives, which goes with the third power of their number,
+/// and not against one subsegment, lest points that slide have to keep to narrow valleys.
 pub(super) fn contact_give(plan: &Plan) -> f64 {
     let gives = plan.data.iter().enumerate().map(|(i, data)| {
         let length = plan.length(i);
         length * length * plan.settings.elements as f64 / data.stiffness[0]
     });
-    GIVE * gives.fold(f64::INFINITY, f64::min)
+    GIVE * gives.fold(f64::INFINITY, f64::min) * plan.data.len() as f64
 }

@@ -20,7 +20,7 @@ const FIRST: f64 = 0.25;
 const SHORTEST: f64 = 1e-3;
 const EASY: usize = 10;
 /// Evaluations that one load step may take.
-const PATIENCE: usize = 60;
+const PATIENCE: usize = 200;
 /// Parts of obstacles within this share of a subsegment are looked at, and points may slip by this share of
 /// one in one step.
 const REACH: f64 = 0.5;
