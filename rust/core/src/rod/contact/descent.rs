@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::field::Field;
-use super::merit::{Estimates, Merit};
+use super::merit::{Estimates, Held, Merit};
 use super::scene::Scene;
 use super::sweep::{At, Sweep};
 use crate::lie::so3;
@@ -255,7 +255,7 @@ impl Descent {
         estimates.tensions.clone_from(&self.here.tensions);
         estimates.forces.clear();
         let pushing = self.here.entries.iter().filter(|entry| entry.force > 0.0);
-        estimates.forces.extend(pushing.map(|entry| (entry.key, entry.force)));
+        estimates.forces.extend(pushing.map(Held::of));
         if estimates.stiffness < STIFFEST {
             estimates.stiffness /= STIFFER;
             estimates.give *= STIFFER;

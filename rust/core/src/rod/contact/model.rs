@@ -1,6 +1,7 @@
 //! The rod among obstacles and under loads as a forward model.
 
 use super::descent::{Descent, GIVE, Left, Surroundings, contact_give};
+use super::merit::Held;
 use super::scene::Scene;
 use crate::error::InvalidInput;
 use crate::lie::Pose;
@@ -50,7 +51,7 @@ pub struct Workspace {
 struct Kept {
     strains: Vec<f64>,
     tensions: Vec<f64>,
-    forces: Vec<(super::merit::Key, f64)>,
+    forces: Vec<Held>,
     bounds: Vec<f64>,
 }
 
