@@ -120,7 +120,8 @@ impl Case {
     }
 
     pub(crate) fn at(&self, contact: &Contact, frames: &[Pose]) -> V {
-        let hole = |sign: f64| self.robot.paths()[contact.tendon.unwrap()].holes[contact.disk] * sign;
+        let hole =
+            |sign: f64| self.robot.paths()[contact.tendon.unwrap()].holes[contact.disk] * sign;
         let local = match contact.kind {
             PointKind::Center => V::zeros(),
             PointKind::Hole => hole(1.0),

@@ -205,7 +205,11 @@ fn every_free_part_is_in_balance() {
     let ball = Sphere::new(&V::new(0.05, 0.006, 0.14), 0.03).unwrap();
     case.obstacles.push(Obstacle::new(ball, false));
     let shape = case.solved(&[-8e-3]);
-    assert!(shape.state.contacts.iter().any(|c| c.force.norm() > 1e-2), "{:?}", shape.state.contacts);
+    assert!(
+        shape.state.contacts.iter().any(|c| c.force.norm() > 1e-2),
+        "{:?}",
+        shape.state.contacts
+    );
     assert!(case.unbalance(&shape) < 1e-9);
     cuts(&case, &shape);
 }

@@ -53,7 +53,8 @@ fn robot(draw: &mut ChaCha8Rng) -> Robot {
         }
     };
     let tendons = (0..draw.random_range(1..=4)).map(|_| {
-        let (azimuth, radius) = (draw.random_range(0.0..TAU), length * draw.random_range(0.02..0.06));
+        let (azimuth, radius) =
+            (draw.random_range(0.0..TAU), length * draw.random_range(0.02..0.06));
         let end = if draw.random_bool(0.7) { n } else { draw.random_range(n.div_ceil(2)..=n) };
         let routing = if draw.random_bool(0.5) {
             Routing::Angles { azimuth: PerDisk::Same(azimuth), radius: PerDisk::Same(radius) }
@@ -67,7 +68,7 @@ fn robot(draw: &mut ChaCha8Rng) -> Robot {
 }
 
 /// A prism of `sides` around the z axis, closed by lids.
-pub(crate) fn prism(sides: usize, rings: usize, radius: f64, half: f64) -> Mesh {
+fn prism(sides: usize, rings: usize, radius: f64, half: f64) -> Mesh {
     let mut vertices = vec![V::new(0.0, 0.0, -half), V::new(0.0, 0.0, half)];
     for ring in 0..=rings {
         let z = -half + 2.0 * half * ring as f64 / rings as f64;
@@ -81,8 +82,7 @@ pub(crate) fn prism(sides: usize, rings: usize, radius: f64, half: f64) -> Mesh 
     for k in 0..sides {
         faces.extend([[0, at(0, k + 1), at(0, k)], [1, at(rings, k), at(rings, k + 1)]]);
         for ring in 0..rings {
-            let [a, b, c, d] =
-                [at(ring, k), at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)];
+            let [a, b, c, d] = [at(ring, k), at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)];
             faces.extend([[a, b, c], [a, c, d]]);
         }
     }
@@ -128,7 +128,10 @@ fn lumen(draw: &mut ChaCha8Rng, l: f64) -> (&'static str, Obstacle) {
         1 => ("in sphere", Obstacle::new(Sphere::new(&center, 0.6 * l + r).unwrap(), true)),
         2 => {
             let half = V::new(r, 0.8 * r, 1.2 * l);
-            ("in box", Obstacle::new(Cuboid::new(&center, &half, &Matrix3::identity()).unwrap(), true))
+            (
+                "in box",
+                Obstacle::new(Cuboid::new(&center, &half, &Matrix3::identity()).unwrap(), true),
+            )
         }
         _ => {
             let mesh = prism(draw.random_range(5..24), 6, r, 1.2 * l);
@@ -211,6 +214,10 @@ fn wrong(drawn: &Drawn, shape: &Shape, sample: bool) -> Option<String> {
         if force < 0.0 || (force > 0.0 && contact.gap.abs() > 1e-10 * l) {
             return Some(format!("contact {contact:?}"));
         }
+        let near = case.obstacles[contact.obstacle].nearest(&contact.point).unwrap().distance;
+        if force > 0.0 && near.abs() > 2e-10 * l {
+            return Some(format!("{near:e} m off: {contact:?}"));
+        }
     }
     for ((path, pull), tension) in
         case.robot.paths().iter().zip(&drawn.pulls).zip(&shape.state.tensions)
@@ -245,7 +252,7 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
 }
 
 /// Draws, solves, checks; the share that converged.
-pub(crate) fn many(count: usize, every: usize) -> f64 {
+fn many(count: usize, every: usize) -> f64 {
     let (mut times, mut iterations) = (Vec::new(), Vec::new());
     let mut table: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
     let (mut done, mut good, mut touching) = (0, 0, 0);

@@ -14,6 +14,7 @@ mod constant_curvature_robot;
 mod contact_common;
 mod contact_derivatives;
 mod contact_golden;
+mod contact_invariances;
 mod contact_loads;
 mod contact_scenes;
 mod inverse;
