@@ -331,7 +331,8 @@ impl Descent {
         let (here, there) = (&mut self.here, &self.there);
         let pushes: Vec<f64> = here.entries.iter().map(|entry| entry.push).collect();
         for entry in &mut here.entries {
-            let Ok(found) = there.entries.binary_search_by(|other| other.key.cmp(&entry.key)) else {
+            let Ok(found) = there.entries.binary_search_by(|other| other.key.cmp(&entry.key))
+            else {
                 continue;
             };
             let bent = there.entries[found].gap - entry.gap - entry.closing(&self.sweep.moved);

@@ -82,12 +82,7 @@ impl Held {
     /// The part as it was, for a point from which it is not seen any more.
     fn near(&self, at: &Vector3<f64>) -> Near {
         let distance = self.normal.dot(at) - self.offset;
-        Near {
-            distance,
-            gradient: self.normal,
-            hessian: Matrix3::zeros(),
-            feature: self.key.3,
-        }
+        Near { distance, gradient: self.normal, hessian: Matrix3::zeros(), feature: self.key.3 }
     }
 }
 
