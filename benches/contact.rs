@@ -44,8 +44,7 @@ fn tube() -> Obstacle {
     for k in 0..sides {
         faces.extend([[0, at(0, k + 1), at(0, k)], [1, at(rings, k), at(rings, k + 1)]]);
         for ring in 0..rings {
-            let [a, b, c, d] =
-                [at(ring, k), at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)];
+            let [a, b, c, d] = [at(ring, k), at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)];
             faces.extend([[a, b, c], [a, c, d]]);
         }
     }

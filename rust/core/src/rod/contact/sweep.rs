@@ -77,23 +77,11 @@ impl Sweep {
     }
 
     fn factor_of<const D: usize, const ONE: bool>(&mut self, at: &At<'_>) {
+        self.prepare(at);
         let plan = at.plan;
         let size = plan.width();
         let n = plan.data.len();
-        self.taut.clear();
-        self.taut.extend((0..at.taut.len()).filter(|k| at.pulling[*k]));
-        self.gradient.resize(n * size, 0.0);
-        self.factors.resize(n * size * size, 0.0);
-        self.twists.resize(n * size, Vector6::zeros());
-        self.coupling.resize(n * size, Vector6::zeros());
         let count = self.taut.len();
-        self.column.resize(n * size, 0.0);
-        self.growing.resize(n * size * count, 0.0);
-        self.reins.clear();
-        self.reins.resize(n * size * count, 0.0);
-        self.rows.resize(plan.pieces.len() * size, 0.0);
-        self.lengths.resize(plan.pieces.len(), 0.0);
-        (self.moment, self.unstable) = (0.0, None);
         let mut beyond = Field::zero();
         let mut value = Matrix6::zeros();
         let mut mixed = vec![Vector6::zeros(); count];
@@ -145,15 +133,12 @@ impl Sweep {
                 }
                 factor[a * (size + 1)] += at.shift * plan.data[i].stiffness[a % D];
             }
-            self.block.clear();
-            self.block.extend_from_slice(factor);
-            if !cholesky(factor, size) {
-                if self.unstable.is_none() {
-                    self.unstable = Some(i);
-                    escape(&self.block, size, &mut self.escape);
-                }
-                raise(factor, &self.block, size, plan.data[i].stiffness[0]);
-            }
+            self.factor_block(i, size, plan.data[i].stiffness[0]);
+            let factor = &self.factors[i * size * size..(i + 1) * size * size];
+            let reins = &self.reins[i * size * count..(i + 1) * size * count];
+            let growing = &mut self.growing[i * size * count..(i + 1) * size * count];
+            let twists = &self.twists[range.clone()];
+            let coupling = &mut self.coupling[range.clone()];
             for a in 0..size {
                 let row = &factor[a * size..=a * size + a];
                 let (before, after) = coupling.split_at_mut(a);
@@ -191,6 +176,41 @@ impl Sweep {
         self.step.clear();
         self.step.resize(n * size, 0.0);
         self.go_out(plan, 0, true);
+    }
+
+    /// Which tendons pull, and room for all.
+    fn prepare(&mut self, at: &At<'_>) {
+        let plan = at.plan;
+        let size = plan.width();
+        let n = plan.data.len();
+        self.taut.clear();
+        self.taut.extend((0..at.taut.len()).filter(|k| at.pulling[*k]));
+        self.gradient.resize(n * size, 0.0);
+        self.factors.resize(n * size * size, 0.0);
+        self.twists.resize(n * size, Vector6::zeros());
+        self.coupling.resize(n * size, Vector6::zeros());
+        let count = self.taut.len();
+        self.column.resize(n * size, 0.0);
+        self.growing.resize(n * size * count, 0.0);
+        self.reins.clear();
+        self.reins.resize(n * size * count, 0.0);
+        self.rows.resize(plan.pieces.len() * size, 0.0);
+        self.lengths.resize(plan.pieces.len(), 0.0);
+        (self.moment, self.unstable) = (0.0, None);
+    }
+
+    /// Factors one block, raised if it is not positive definite.
+    fn factor_block(&mut self, i: usize, size: usize, stiffness: f64) {
+        let factor = &mut self.factors[i * size * size..(i + 1) * size * size];
+        self.block.clear();
+        self.block.extend_from_slice(factor);
+        if !cholesky(factor, size) {
+            if self.unstable.is_none() {
+                self.unstable = Some(i);
+                escape(&self.block, size, &mut self.escape);
+            }
+            raise(factor, &self.block, size, stiffness);
+        }
     }
 
     /// Slopes of the pulling tendons' lengths by one subsegment's unknowns.
