@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::field::Field;
-use super::merit::{Estimates, Merit};
+use super::merit::{Estimates, Held, Merit};
 use super::scene::Scene;
 use super::sweep::{At, Sweep};
 use crate::lie::so3;
@@ -31,6 +31,11 @@ const ROUGH: f64 = 1e-10;
 const LOOSE: f64 = 1e-1;
 /// Sets of active conditions that are tried for one step.
 const SETS: usize = 8;
+/// The least shift of the Hessian where steps turn out too long, in shares of the stiffness, the largest, and how
+/// it changes.
+const SHIFT: f64 = 1e-5;
+const SHIFTS: f64 = 1e2;
+const CHANGE: f64 = 8.0;
 /// A nudge off a saddle \[rad\], and how often.
 const NUDGE: f64 = 1e-2;
 const NUDGES: usize = 6;
@@ -83,8 +88,15 @@ pub(super) struct Descent {
     /// Slope of the value here, whatever the sets, and the step with the sets of this shape.
     slope: Vec<f64>,
     first: Vec<f64>,
+    straight: Vec<f64>,
     moment: f64,
     unstable: Option<usize>,
+    /// Direction out of an unstable shape, its largest component 1.
+    escape: Vec<f64>,
+    /// Of the Hessian: steps that turned out too long become shorter.
+    shift: f64,
+    /// Whether stability was looked at with it.
+    shifted: bool,
 }
 
 impl Descent {
@@ -98,6 +110,7 @@ impl Descent {
         let tolerance = around.plan.settings.tolerance.max(ROUGH);
         let mut left = Left::default();
         let mut loose = LOOSE;
+        self.shift = 0.0;
         self.evaluate_here(around)?;
         loop {
             self.factor(around);
@@ -105,6 +118,11 @@ impl Descent {
             left = Left { moment: self.moment, ..self.left(around, left.nudged) };
             if !left.worst().is_finite() {
                 return Ok((Ending::Broken, left));
+            }
+            if left.worst() <= tolerance && self.shifted {
+                // Whether this is a minimum is not known yet.
+                self.shift = 0.0;
+                continue;
             }
             if left.worst() <= tolerance {
                 if self.unstable.is_none() || left.nudged >= NUDGES {
@@ -153,9 +171,17 @@ impl Descent {
         self.pulling.extend(self.here.tensions.iter().map(|tension| *tension > 0.0));
         self.active.clear();
         self.active.extend(self.here.entries.iter().map(|entry| entry.force > 0.0));
+        self.shifted = self.shift > 0.0;
         self.sweep_once(around);
         self.slope.clone_from(&self.sweep.gradient);
         (self.moment, self.unstable) = (self.sweep.moment, self.sweep.unstable);
+        if self.unstable.is_some() {
+            self.sweep.lead_out(plan, &mut self.escape);
+        }
+        while self.sweep.unstable.is_some() && self.shift <= SHIFTS {
+            self.shift = SHIFT.max(CHANGE * self.shift);
+            self.sweep_once(around);
+        }
         self.first.clone_from(&self.sweep.step);
         for _ in 0..SETS {
             if !self.foresee(plan) {
@@ -182,6 +208,7 @@ impl Descent {
             taut: &self.bounded,
             pulling: &self.pulling,
             give: &self.gives,
+            shift: self.shift,
         });
     }
 
@@ -189,11 +216,7 @@ impl Descent {
     fn foresee(&mut self, plan: &Plan) -> bool {
         let mut others = false;
         for (entry, active) in self.here.entries.iter().zip(&mut self.active) {
-            let moved = &self.sweep.moved[entry.key.0];
-            let spin = Vector3::new(moved[0], moved[1], moved[2]);
-            let velocity = Vector3::new(moved[3], moved[4], moved[5]) + spin.cross(&entry.at);
-            let pushes =
-                entry.push - entry.near.gradient.dot(&velocity) / self.estimates.give > 0.0;
+            let pushes = entry.push - entry.closing(&self.sweep.moved) / self.estimates.give > 0.0;
             others |= pushes != *active;
             *active = pushes;
         }
@@ -232,7 +255,7 @@ impl Descent {
         estimates.tensions.clone_from(&self.here.tensions);
         estimates.forces.clear();
         let pushing = self.here.entries.iter().filter(|entry| entry.force > 0.0);
-        estimates.forces.extend(pushing.map(|entry| (entry.key, entry.force)));
+        estimates.forces.extend(pushing.map(Held::of));
         if estimates.stiffness < STIFFEST {
             estimates.stiffness /= STIFFER;
             estimates.give *= STIFFER;
@@ -250,24 +273,81 @@ impl Descent {
         if slope.is_nan() || longest == 0.0 {
             return Ok(false);
         }
-        let mut share = 1.0_f64.min(STEP / longest);
-        for _ in 0..BACKTRACKS {
-            self.there.strains.clear();
-            let moved = self.here.strains.iter().zip(&self.sweep.step);
-            self.there.strains.extend(moved.map(|(own, step)| own + share * step));
-            let Surroundings { plan, scene, bounds, share: loads, reach, .. } = *around;
-            self.there.evaluate(plan, scene, bounds, loads, &self.estimates, reach)?;
-            let wanted = self.here.value
-                + ARMIJO * share * slope
-                + ROUNDING * self.here.size
-                + self.moment_work(around);
-            if self.there.value <= wanted && self.passes(around) {
+        let whole = 1.0_f64.min(STEP / longest);
+        let mut share = whole;
+        for trial in 0..BACKTRACKS {
+            if self.goes_down(around, share, slope)? {
+                self.relax(share, whole);
                 std::mem::swap(&mut self.here, &mut self.there);
                 return Ok(true);
+            }
+            if trial == 0 && share == 1.0 {
+                self.correct(around);
+                if self.goes_down(around, 1.0, slope)? {
+                    self.relax(share, whole);
+                    std::mem::swap(&mut self.here, &mut self.there);
+                    return Ok(true);
+                }
+                self.sweep.step.clone_from(&self.straight);
             }
             share *= 0.5;
         }
         Ok(false)
+    }
+
+    /// A shorter step next time if this one was cut, a longer one if not.
+    fn relax(&mut self, share: f64, whole: f64) {
+        if share < 0.2 * whole {
+            self.shift = SHIFT.max(CHANGE * self.shift).min(SHIFTS);
+        } else if share == whole {
+            self.shift = if self.shift > SHIFT { self.shift / CHANGE } else { 0.0 };
+        }
+    }
+
+    /// Evaluates `there` at a share of the step; whether that lowers the value by what the slope tells.
+    fn goes_down(
+        &mut self,
+        around: &Surroundings<'_>,
+        share: f64,
+        slope: f64,
+    ) -> Result<bool, Fault> {
+        self.there.strains.clear();
+        let moved = self.here.strains.iter().zip(&self.sweep.step);
+        self.there.strains.extend(moved.map(|(own, step)| own + share * step));
+        let Surroundings { plan, scene, bounds, share: loads, reach, .. } = *around;
+        self.there.evaluate(plan, scene, bounds, loads, &self.estimates, reach)?;
+        let wanted = self.here.value
+            + ARMIJO * share * slope
+            + ROUNDING * self.here.size
+            + self.moment_work(around);
+        Ok(self.there.value <= wanted && self.passes(around))
+    }
+
+    /// The step that meets the conditions as they bend on the way `there`, the end of the whole step, which
+    /// is kept in `straight`.
+    fn correct(&mut self, around: &Surroundings<'_>) {
+        self.straight.clone_from(&self.sweep.step);
+        self.sweep.lengthen(around.plan, &mut self.lengthened);
+        let (here, there) = (&mut self.here, &self.there);
+        let pushes: Vec<f64> = here.entries.iter().map(|entry| entry.push).collect();
+        for entry in &mut here.entries {
+            let Ok(found) = there.entries.binary_search_by(|other| other.key.cmp(&entry.key))
+            else {
+                continue;
+            };
+            let bent = there.entries[found].gap - entry.gap - entry.closing(&self.sweep.moved);
+            entry.push -= bent / self.estimates.give;
+        }
+        let pulls = here.pulls.clone();
+        for (k, pull) in here.pulls.iter_mut().enumerate().filter(|(k, _)| self.pulling[*k]) {
+            let bent = there.over[k] - here.over[k] - self.lengthened[k];
+            *pull += bent / self.gives[k];
+        }
+        self.sweep_once(around);
+        self.here.pulls = pulls;
+        for (entry, push) in self.here.entries.iter_mut().zip(pushes) {
+            entry.push = push;
+        }
     }
 
     /// Work that a moment on the tip, which has no potential, does on the way there.
@@ -294,22 +374,19 @@ impl Descent {
 
     /// Leaves a saddle.
     fn nudge(&mut self, around: &Surroundings<'_>) -> Result<(), Fault> {
-        let size = around.plan.width();
-        if let Some(i) = self.unstable {
-            let own = &mut self.here.strains[i * size..(i + 1) * size];
-            for (own, escape) in own.iter_mut().zip(&self.sweep.escape) {
-                *own += NUDGE * escape;
-            }
+        for (own, escape) in self.here.strains.iter_mut().zip(&self.escape) {
+            *own += NUDGE * escape;
         }
         self.evaluate_here(around)
     }
 }
 
-/// Compliance of contacts that is small against what a subsegment gives.
+/// Compliance of contacts: small against what the whole rod gives, which goes with the third power of their number,
+/// and not against one subsegment, lest points that slide have to keep to narrow valleys.
 pub(super) fn contact_give(plan: &Plan) -> f64 {
     let gives = plan.data.iter().enumerate().map(|(i, data)| {
         let length = plan.length(i);
         length * length * plan.settings.elements as f64 / data.stiffness[0]
     });
-    GIVE * gives.fold(f64::INFINITY, f64::min)
+    GIVE * gives.fold(f64::INFINITY, f64::min) * plan.data.len() as f64
 }

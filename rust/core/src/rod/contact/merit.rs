@@ -4,7 +4,7 @@
 //! `max(0, (c T̂ + s) / (c + C))`, C its own compliance, a point that has sunk in by s is pushed with
 //! `max(0, λ̂ + s / c)`. What is minimised is then smooth, and exact once the estimates are the multipliers.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::field::Field;
 use super::scene::Scene;
@@ -30,6 +30,16 @@ pub(super) struct Entry {
     pub(super) push: f64,
 }
 
+impl Entry {
+    /// What the disks' first-order displacements add to the gap.
+    pub(super) fn closing(&self, moved: &[Vector6<f64>]) -> f64 {
+        let moved = &moved[self.key.0];
+        let spin = Vector3::new(moved[0], moved[1], moved[2]);
+        let velocity = Vector3::new(moved[3], moved[4], moved[5]) + spin.cross(&self.at);
+        self.near.gradient.dot(&velocity)
+    }
+}
+
 /// A shape and what it is worth.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Merit {
@@ -53,12 +63,35 @@ pub(super) struct Merit {
     near: Vec<Near>,
 }
 
+/// An estimate of a contact's multiplier, with the plane that the obstacle's part was there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    pub(super) key: Key,
+    pub(super) force: f64,
+    normal: Vector3<f64>,
+    offset: f64,
+}
+
+impl Held {
+    pub(super) fn of(entry: &Entry) -> Self {
+        let normal = entry.near.gradient;
+        let offset = normal.dot(&entry.at) - entry.near.distance;
+        Self { key: entry.key, force: entry.force, normal, offset }
+    }
+
+    /// The part as it was, for a point from which it is not seen any more.
+    fn near(&self, at: &Vector3<f64>) -> Near {
+        let distance = self.normal.dot(at) - self.offset;
+        Near { distance, gradient: self.normal, hessian: Matrix3::zeros(), feature: self.key.3 }
+    }
+}
+
 /// Estimates of the multipliers and the compliances that go with them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Estimates {
     pub(super) tensions: Vec<f64>,
     /// Those that are not zero, by key, in order.
-    pub(super) forces: Vec<(Key, f64)>,
+    pub(super) forces: Vec<Held>,
     /// Of each tendon and of contacts \[m per unit\].
     pub(super) tendon_give: Vec<f64>,
     pub(super) give: f64,
@@ -67,9 +100,12 @@ pub(super) struct Estimates {
 }
 
 impl Estimates {
-    fn force(&self, key: &Key) -> f64 {
-        let place = self.forces.binary_search_by(|(own, _)| own.cmp(key));
-        place.map_or(0.0, |k| self.forces[k].1)
+    /// Those of one point before one obstacle.
+    fn of(&self, disk: usize, point: usize, obstacle: usize) -> &[Held] {
+        let name = (disk, point, obstacle);
+        let start = self.forces.partition_point(|h| (h.key.0, h.key.1, h.key.2) < name);
+        let rest = &self.forces[start..];
+        &rest[..rest.partition_point(|h| (h.key.0, h.key.1, h.key.2) == name)]
     }
 }
 
@@ -151,13 +187,19 @@ impl Merit {
                     self.near.clear();
                     obstacle.constraints(&at, reach + point.radius, &mut self.near)?;
                     for near in &self.near {
+                        clear = clear.min(near.distance - point.radius);
+                    }
+                    let held = estimates.of(disk, p, o);
+                    let moved = keep_parts(&mut self.near, held, &at);
+                    for k in 0..self.near.len() {
+                        let near = self.near[k];
                         let gap = near.distance - point.radius;
-                        clear = clear.min(gap);
                         let key = (disk, p, o, near.feature);
-                        let push = estimates.force(&key) - gap / estimates.give;
+                        let own = held.iter().find(|held| moved || held.key == key);
+                        let push = own.map_or(0.0, |held| held.force) - gap / estimates.give;
                         let force = push.max(0.0);
                         if force > 0.0 || gap < reach {
-                            self.entries.push(Entry { key, at, near: *near, gap, force, push });
+                            self.entries.push(Entry { key, at, near, gap, force, push });
                         }
                         let worth = 0.5 * estimates.give * force * force;
                         self.value += worth;
@@ -197,4 +239,21 @@ impl Merit {
             out[entry.key.0].add_point(&entry.at, &(n * -entry.push), &curvature);
         }
     }
+}
+
+/// What pushed a point pushes on where the part is not seen any more, lest the value jump: round a ridge the next
+/// part takes over (true), in a valley the plane goes on.
+fn keep_parts(parts: &mut Vec<Near>, held: &[Held], at: &Vector3<f64>) -> bool {
+    let seen = parts.len();
+    for one in held {
+        if parts[..seen].iter().any(|near| near.feature == one.key.3) {
+            continue;
+        }
+        let near = one.near(at);
+        if held.len() == 1 && seen == 1 && parts[0].distance >= near.distance {
+            return true;
+        }
+        parts.push(near);
+    }
+    false
 }

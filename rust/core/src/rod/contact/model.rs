@@ -1,6 +1,7 @@
 //! The rod among obstacles and under loads as a forward model.
 
 use super::descent::{Descent, GIVE, Left, Surroundings, contact_give};
+use super::merit::Held;
 use super::scene::Scene;
 use crate::error::InvalidInput;
 use crate::lie::Pose;
@@ -20,7 +21,7 @@ const FIRST: f64 = 0.25;
 const SHORTEST: f64 = 1e-3;
 const EASY: usize = 10;
 /// Evaluations that one load step may take.
-const PATIENCE: usize = 60;
+const PATIENCE: usize = 200;
 /// Parts of obstacles within this share of a subsegment are looked at, and points may slip by this share of
 /// one in one step.
 const REACH: f64 = 0.5;
@@ -50,7 +51,7 @@ pub struct Workspace {
 struct Kept {
     strains: Vec<f64>,
     tensions: Vec<f64>,
-    forces: Vec<(super::merit::Key, f64)>,
+    forces: Vec<Held>,
     bounds: Vec<f64>,
 }
 

@@ -30,6 +30,8 @@ pub(super) struct At<'a> {
     pub(super) pulling: &'a [bool],
     /// Compliance of the taut tendons beyond what the rod gives.
     pub(super) give: &'a [f64],
+    /// Added to the Hessian, in shares of the stiffness.
+    pub(super) shift: f64,
 }
 
 /// The factored Hessian, the gradient and the step.
@@ -42,14 +44,18 @@ pub(super) struct Sweep {
     pub(super) moment: f64,
     /// First block (from the tip) that is not positive definite, with a direction of descent in it.
     pub(super) unstable: Option<usize>,
-    pub(super) escape: Vec<f64>,
+    escape: Vec<f64>,
     pub(super) step: Vec<f64>,
     twists: Vec<Vector6<f64>>,
     factors: Vec<f64>,
     /// `L⁻¹` times the coupling to the base's displacement, six numbers per unknown.
     coupling: Vec<Vector6<f64>>,
-    /// `L⁻¹` times the gradient, and one column per taut tendon.
-    columns: Vec<Vec<f64>>,
+    /// The same to what the tendons have grown by up to the base, one number per tendon that pulls.
+    growing: Vec<f64>,
+    /// Slopes of their lengths by every unknown.
+    reins: Vec<f64>,
+    /// `L⁻¹` times the gradient.
+    column: Vec<f64>,
     /// Slopes of every piece's length.
     rows: Vec<f64>,
     lengths: Vec<f64>,
@@ -71,28 +77,28 @@ impl Sweep {
     }
 
     fn factor_of<const D: usize, const ONE: bool>(&mut self, at: &At<'_>) {
+        self.prepare(at);
         let plan = at.plan;
         let size = plan.width();
         let n = plan.data.len();
-        self.taut.clear();
-        self.taut.extend((0..at.taut.len()).filter(|k| at.pulling[*k]));
-        self.gradient.resize(n * size, 0.0);
-        self.factors.resize(n * size * size, 0.0);
-        self.twists.resize(n * size, Vector6::zeros());
-        self.coupling.resize(n * size, Vector6::zeros());
-        self.columns.resize_with(1 + self.taut.len(), Vec::new);
-        self.columns.iter_mut().for_each(|column| column.resize(n * size, 0.0));
-        self.rows.resize(plan.pieces.len() * size, 0.0);
-        self.lengths.resize(plan.pieces.len(), 0.0);
-        (self.moment, self.unstable) = (0.0, None);
+        let count = self.taut.len();
         let mut beyond = Field::zero();
         let mut value = Matrix6::zeros();
-        let mut slopes = vec![Vector6::zeros(); 1 + self.taut.len()];
+        let mut mixed = vec![Vector6::zeros(); count];
+        let mut held = vec![0.0; count * count];
+        for (k, tendon) in self.taut.iter().enumerate() {
+            held[k * (count + 1)] = 1.0 / at.give[*tendon];
+        }
+        let mut slope = Vector6::zeros();
+        let mut grown = vec![0.0; count];
         for i in (0..n).rev() {
             beyond.add(&at.fields[i + 1]);
             self.differentiate::<D, ONE>(at, i);
             self.add_fields::<D>(at, i, &beyond);
+            self.rein(plan, i);
             let range = i * size..(i + 1) * size;
+            let reins = &self.reins[i * size * count..(i + 1) * size * count];
+            let growing = &mut self.growing[i * size * count..(i + 1) * size * count];
             let twists = &self.twists[range.clone()];
             let coupling = &mut self.coupling[range.clone()];
             for ((twist, own), (k, slope)) in twists
@@ -107,55 +113,117 @@ impl Sweep {
                 }
                 *own = (beyond.curvature + value) * twist + bracket(&beyond.slope, twist) * 0.5;
             }
+            for a in 0..size {
+                let (twist, rein) = (&twists[a], &reins[a * count..(a + 1) * count]);
+                for k in 0..count {
+                    coupling[a] += mixed[k] * rein[k];
+                    growing[a * count + k] =
+                        mixed[k].dot(twist) + dot(&held[k * count..(k + 1) * count], rein);
+                }
+            }
             let factor = &mut self.factors[i * size * size..(i + 1) * size * size];
             for a in 0..size {
                 for b in 0..=a {
                     factor[a * size + b] += twists[a].dot(&(value * twists[b]));
-                }
-            }
-            self.block.clear();
-            self.block.extend_from_slice(factor);
-            if !cholesky(factor, size) {
-                if self.unstable.is_none() {
-                    self.unstable = Some(i);
-                    escape(&self.block, size, &mut self.escape);
-                }
-                raise(factor, &self.block, size, plan.data[i].stiffness[0]);
-            }
-            for a in 0..size {
-                let (before, after) = coupling.split_at_mut(a);
-                let mut own = after[0];
-                for (other, l) in before.iter().zip(&factor[a * size..a * size + a]) {
-                    own -= other * *l;
-                }
-                after[0] = own * factor[a * (size + 1)];
-            }
-            for (j, (column, slope)) in self.columns.iter_mut().zip(&mut slopes).enumerate() {
-                let own = &mut column[range.clone()];
-                if j == 0 {
-                    own.copy_from_slice(&self.gradient[range.clone()]);
-                } else {
-                    own.fill(0.0);
-                    let tendon = self.taut[j - 1];
-                    let pieces = &plan.pieces[plan.starts[i]..plan.starts[i + 1]];
-                    if let Some(p) = pieces.iter().position(|piece| piece.tendon == tendon) {
-                        let p = plan.starts[i] + p;
-                        own.copy_from_slice(&self.rows[p * size..(p + 1) * size]);
+                    for k in 0..count {
+                        let (own, other) = (reins[a * count + k], reins[b * count + k]);
+                        factor[a * size + b] += own * growing[b * count + k];
+                        factor[a * size + b] += other * mixed[k].dot(&twists[a]);
                     }
                 }
-                for (own, twist) in own.iter_mut().zip(twists) {
-                    *own += twist.dot(slope);
+                factor[a * (size + 1)] += at.shift * plan.data[i].stiffness[a % D];
+            }
+            self.factor_block(i, size, plan.data[i].stiffness[0]);
+            let factor = &self.factors[i * size * size..(i + 1) * size * size];
+            let reins = &self.reins[i * size * count..(i + 1) * size * count];
+            let growing = &mut self.growing[i * size * count..(i + 1) * size * count];
+            let twists = &self.twists[range.clone()];
+            let coupling = &mut self.coupling[range.clone()];
+            for a in 0..size {
+                let row = &factor[a * size..=a * size + a];
+                let (before, after) = coupling.split_at_mut(a);
+                let (nearer, own) = growing.split_at_mut(a * count);
+                for (b, l) in row[..a].iter().enumerate() {
+                    after[0] -= before[b] * *l;
+                    for k in 0..count {
+                        own[k] -= nearer[b * count + k] * l;
+                    }
                 }
-                forward(factor, size, own);
-                for (own, coupling) in own.iter().zip(&*coupling) {
-                    *slope -= coupling * *own;
+                after[0] *= row[a];
+                own[..count].iter_mut().for_each(|own| *own *= row[a]);
+            }
+            let column = &mut self.column[range.clone()];
+            for a in 0..size {
+                let rein = &reins[a * count..(a + 1) * count];
+                column[a] = self.gradient[i * size + a] + twists[a].dot(&slope) + dot(rein, &grown);
+            }
+            forward(factor, size, column);
+            for (a, z) in column.iter().enumerate() {
+                slope -= coupling[a] * *z;
+                let growing = &growing[a * count..(a + 1) * count];
+                for k in 0..count {
+                    grown[k] -= growing[k] * z;
+                    mixed[k] -= coupling[a] * growing[k];
+                    for l in 0..count {
+                        held[k * count + l] -= growing[k] * growing[l];
+                    }
                 }
             }
             for coupling in &*coupling {
                 value -= coupling * coupling.transpose();
             }
         }
-        self.finish(at);
+        self.step.clear();
+        self.step.resize(n * size, 0.0);
+        self.go_out(plan, 0, true);
+    }
+
+    /// Which tendons pull, and room for all.
+    fn prepare(&mut self, at: &At<'_>) {
+        let plan = at.plan;
+        let size = plan.width();
+        let n = plan.data.len();
+        self.taut.clear();
+        self.taut.extend((0..at.taut.len()).filter(|k| at.pulling[*k]));
+        self.gradient.resize(n * size, 0.0);
+        self.factors.resize(n * size * size, 0.0);
+        self.twists.resize(n * size, Vector6::zeros());
+        self.coupling.resize(n * size, Vector6::zeros());
+        let count = self.taut.len();
+        self.column.resize(n * size, 0.0);
+        self.growing.resize(n * size * count, 0.0);
+        self.reins.clear();
+        self.reins.resize(n * size * count, 0.0);
+        self.rows.resize(plan.pieces.len() * size, 0.0);
+        self.lengths.resize(plan.pieces.len(), 0.0);
+        (self.moment, self.unstable) = (0.0, None);
+    }
+
+    /// Factors one block, raised if it is not positive definite.
+    fn factor_block(&mut self, i: usize, size: usize, stiffness: f64) {
+        let factor = &mut self.factors[i * size * size..(i + 1) * size * size];
+        self.block.clear();
+        self.block.extend_from_slice(factor);
+        if !cholesky(factor, size) {
+            if self.unstable.is_none() {
+                self.unstable = Some(i);
+                escape(&self.block, size, &mut self.escape);
+            }
+            raise(factor, &self.block, size, stiffness);
+        }
+    }
+
+    /// Slopes of the pulling tendons' lengths by one subsegment's unknowns.
+    fn rein(&mut self, plan: &Plan, i: usize) {
+        let (size, count) = (plan.width(), self.taut.len());
+        let (first, pieces) = (plan.starts[i], &plan.pieces[plan.starts[i]..plan.starts[i + 1]]);
+        for (k, tendon) in self.taut.iter().enumerate() {
+            if let Some(p) = pieces.iter().position(|piece| piece.tendon == *tendon) {
+                for a in 0..size {
+                    self.reins[(i * size + a) * count + k] = self.rows[(first + p) * size + a];
+                }
+            }
+        }
     }
 
     /// Energy and tendons of one subsegment, and its twists.
@@ -220,48 +288,47 @@ impl Sweep {
         }
     }
 
-    /// The step, from what the columns of gradient and tendons have become.
-    fn finish(&mut self, at: &At<'_>) {
-        let count = self.taut.len();
-        let size = at.plan.width();
-        let (gradient, rows) = self.columns.split_at_mut(1);
-        let gradient = &mut gradient[0];
-        let mut schur = vec![0.0; count * count];
-        let mut pulls = vec![0.0; count];
-        for a in 0..count {
-            for b in 0..=a {
-                schur[a * count + b] = dot(&rows[a], &rows[b]);
-            }
-            schur[a * (count + 1)] += at.give[self.taut[a]];
-            pulls[a] = -dot(&rows[a], gradient);
-        }
-        if cholesky(&mut schur, count) {
-            forward(&schur, count, &mut pulls);
-            backward(&schur, count, &mut pulls);
-            for (row, pull) in rows.iter().zip(&pulls) {
-                for (own, entry) in gradient.iter_mut().zip(row) {
-                    *own += pull * entry;
-                }
-            }
-        }
-        self.step.resize(gradient.len(), 0.0);
+    /// The step from a subsegment on: by the gradient, or as an answer to the one that this subsegment has.
+    fn go_out(&mut self, plan: &Plan, from: usize, by_gradient: bool) {
+        let (size, count) = (plan.width(), self.taut.len());
         let mut moved = Vector6::zeros();
+        let mut grown = vec![0.0; count];
         self.moved.clear();
-        self.moved.push(moved);
-        for i in 0..at.plan.data.len() {
+        self.moved.resize(from + 1, moved);
+        for i in from..plan.data.len() {
             let range = i * size..(i + 1) * size;
             let own = &mut self.step[range.clone()];
-            for ((own, z), coupling) in
-                own.iter_mut().zip(&gradient[range.clone()]).zip(&self.coupling[range.clone()])
-            {
-                *own = -(z + coupling.dot(&moved));
+            if by_gradient || i > from {
+                for a in 0..size {
+                    let e = i * size + a;
+                    let growing = &self.growing[e * count..(e + 1) * count];
+                    own[a] = -(self.coupling[e].dot(&moved) + dot(growing, &grown));
+                    if by_gradient {
+                        own[a] -= self.column[e];
+                    }
+                }
+                backward(&self.factors[i * size * size..(i + 1) * size * size], size, own);
             }
-            backward(&self.factors[i * size * size..(i + 1) * size * size], size, own);
-            for (own, twist) in own.iter().zip(&self.twists[range]) {
-                moved += twist * *own;
+            for (e, own) in range.zip(own) {
+                moved += self.twists[e] * *own;
+                for (k, grown) in grown.iter_mut().enumerate() {
+                    *grown += self.reins[e * count + k] * *own;
+                }
             }
             self.moved.push(moved);
         }
+    }
+
+    /// The direction of negative curvature that starts in the unstable block, largest component 1.
+    pub(super) fn lead_out(&mut self, plan: &Plan, out: &mut Vec<f64>) {
+        let Some(i) = self.unstable else { return };
+        let size = plan.width();
+        self.step.fill(0.0);
+        self.step[i * size..(i + 1) * size].copy_from_slice(&self.escape);
+        self.go_out(plan, i, false);
+        let most = self.step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+        out.clear();
+        out.extend(self.step.iter().map(|s| s / most));
     }
 
     /// What the step adds to the length of every tendon, to first order.
