@@ -262,6 +262,7 @@ fn input_that_makes_no_sense_is_refused() {
         (RodSettings { elements: 0, ..default() }, "elements"),
         (RodSettings { elements: 101, ..default() }, "elements"),
         (RodSettings { tolerance: 0.0, ..default() }, "tolerance"),
+        (RodSettings { tolerance: 1e-16, ..default() }, "tolerance"),
         (RodSettings { tolerance: f64::NAN, ..default() }, "tolerance"),
         (RodSettings { max_iterations: 0, ..default() }, "max_iterations"),
     ] {
