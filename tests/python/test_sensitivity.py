@@ -243,6 +243,22 @@ def test_at_rest_tendons_are_followed_on_their_pulled_side(tendons):
     assert one[:, 1].any()
 
 
+def test_at_rest_near_tendons_are_followed_together():
+    """Pulling one of two near ones lets the other go slack, which no matrix says."""
+    robot = tdcr.Robot(tdcr.Backbone(0.2, 10), [tdcr.Tendon(a, 0.01) for a in (0.0, 1.0)])
+    step, rest = 1e-6, np.array([0.0, 0.0, 0.2])
+    for second in (0.0, np.inf):
+        exact = tdcr.jacobian(robot, [0.0, second])[:3].sum(axis=1)
+        near, far = (
+            tdcr.forward(robot, [-pull, second - pull]).require().positions[-1]
+            for pull in (step, 2 * step)
+        )
+        difference = (3 * rest - 4 * near + far) / (2 * step)
+        assert np.abs(exact - difference).max() < 1e-6 * np.abs(difference).max()
+    together, alone = tdcr.jacobian(robot, [0.0, 0.0]), tdcr.jacobian(robot, [0.0, np.inf])
+    assert np.abs(together[:, 0] - alone[:, 0]).max() > 1
+
+
 def test_dependent_tendons_are_flagged():
     three = tdcr.Robot(tdcr.Backbone(0.2, 10), [tdcr.Tendon(2.1 * k, 0.01) for k in range(3)])
     held = tdcr.sensitivity(tdcr.forward(three, [0.0, 0.0, 0.0]))
