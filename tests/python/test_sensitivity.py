@@ -397,3 +397,10 @@ def test_the_docstrings_say_units_and_shapes():
         text = inspect.getdoc(thing)
         assert all(words in text for words in ("shape (", "Returns", "Raises", "InvalidInput"))
     assert "world axes" in inspect.getdoc(tdcr.Sensitivity.adjoint)
+
+
+def test_a_tendon_without_leverage_has_no_column():
+    crossing = tdcr.Tendon([0.0, np.pi] * 5 + [0.0], 0.008)
+    robot = tdcr.Robot(tdcr.Backbone(0.2, 10), [crossing])
+    assert not tdcr.jacobian(robot, [0.0]).any()
+    assert tdcr.sensitivity(tdcr.forward(robot, [0.0])).dependent
