@@ -243,6 +243,22 @@ def test_at_rest_tendons_are_followed_on_their_pulled_side(tendons):
     assert one[:, 1].any()
 
 
+def test_at_rest_near_tendons_are_followed_together():
+    """Pulling one of two near ones lets the other go slack, which no matrix says."""
+    robot = tdcr.Robot(tdcr.Backbone(0.2, 10), [tdcr.Tendon(a, 0.01) for a in (0.0, 1.0)])
+    step, rest = 1e-6, np.array([0.0, 0.0, 0.2])
+    for second in (0.0, np.inf):
+        exact = tdcr.jacobian(robot, [0.0, second])[:3].sum(axis=1)
+        near, far = (
+            tdcr.forward(robot, [-pull, second - pull]).require().positions[-1]
+            for pull in (step, 2 * step)
+        )
+        difference = (3 * rest - 4 * near + far) / (2 * step)
+        assert np.abs(exact - difference).max() < 1e-6 * np.abs(difference).max()
+    together, alone = tdcr.jacobian(robot, [0.0, 0.0]), tdcr.jacobian(robot, [0.0, np.inf])
+    assert np.abs(together[:, 0] - alone[:, 0]).max() > 1
+
+
 def test_dependent_tendons_are_flagged():
     three = tdcr.Robot(tdcr.Backbone(0.2, 10), [tdcr.Tendon(2.1 * k, 0.01) for k in range(3)])
     held = tdcr.sensitivity(tdcr.forward(three, [0.0, 0.0, 0.0]))
@@ -381,3 +397,10 @@ def test_the_docstrings_say_units_and_shapes():
         text = inspect.getdoc(thing)
         assert all(words in text for words in ("shape (", "Returns", "Raises", "InvalidInput"))
     assert "world axes" in inspect.getdoc(tdcr.Sensitivity.adjoint)
+
+
+def test_a_tendon_without_leverage_has_no_column():
+    crossing = tdcr.Tendon([0.0, np.pi] * 5 + [0.0], 0.008)
+    robot = tdcr.Robot(tdcr.Backbone(0.2, 10), [crossing])
+    assert not tdcr.jacobian(robot, [0.0]).any()
+    assert tdcr.sensitivity(tdcr.forward(robot, [0.0])).dependent

@@ -39,6 +39,16 @@ fn answers_meet_the_conditions_of_optimality() {
     assert!(at_bounds > 1000);
 }
 
+/// A slack tendon's distance from its bound says nothing about how exact another's slope is.
+#[test]
+fn a_variable_far_onto_its_bound_hides_no_other() {
+    let mut solver = Bounded::default();
+    for far in [-1.0, -1e15, -1e300] {
+        assert!(solver.solve(&[1.0, 0.1, 0.1, 1.0], &[1e-3, far], &[0.0; 2], |_| false));
+        assert_eq!(solver.step, [1e-3, 0.0]);
+    }
+}
+
 #[test]
 fn what_is_not_a_number_is_refused() {
     let mut solver = Bounded::default();

@@ -37,7 +37,7 @@ use crate::shape::Shape;
 /// axial : bool, optional
 ///     Whether elements stretch. Needs Young's modulus and diameter of the backbone.
 /// tolerance : float, optional
-///     Relative residual of forces and lengths that counts as solved. In (0, 1e-3].
+///     Relative residual of forces and lengths that counts as solved, 1e-13 to 1e-3.
 /// max_iterations : int, optional
 ///     Evaluations of the whole rod at most, each of which ends in a Newton step.
 ///

@@ -44,8 +44,9 @@ use crate::shape::Shape;
 ///     where the robot is straight. Columns of tendons that do not count are zero: free and slack ones of
 ///     the rod; of constant curvature, free ones and the only, released one of a segment. A tendon of the
 ///     rod that is just as long as it may be, without tension, is followed on its pulled side, where it
-///     moves the tip: so are all tendons at rest, held at 0. Where taut tendons depend on each other
-///     (three on one inextensible segment) no displacement can change alone: the columns are then those
+///     moves the tip: so are all tendons at rest, held at 0. That holds for changes that leave all of
+///     these under tension, not for one that lets some go slack: free (`inf`) those. Where taut
+///     tendons depend on each other (three on one inextensible segment) no displacement can change alone: the columns are then those
 ///     of the nearest change that the rod can follow.
 ///
 /// Raises
@@ -174,9 +175,9 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
 /// Exact derivatives at a shape of the rod; made by `sensitivity`.
 ///
 /// Tendons under tension count, and those that are just as long as they may be: the latter are followed on
-/// their pulled side, at rest for instance. Free and slack ones do not. Where tendons that count depend on
-/// each other (`dependent`), displacements cannot change one by one: derivatives are then those of the
-/// nearest change that the rod can follow. With proportional tendons, tensions are those of the base pieces.
+/// their pulled side, at rest for instance, for changes that let none of them go slack. Free and slack ones
+/// do not. Where tendons that count depend on each other (`dependent`), displacements cannot change one by
+/// one: derivatives are then those of the nearest change that the rod can follow. With proportional tendons, tensions are those of the base pieces.
 #[pyclass(frozen, eq, module = "tdcr")]
 pub(crate) struct Sensitivity {
     shape: Py<Shape>,

@@ -82,6 +82,8 @@ impl Default for RodSettings {
 
 /// Elements per subsegment at most.
 const MOST_ELEMENTS: usize = 100;
+/// What rounding leaves of a thousand subsegments; below it, shapes that exist would be infeasible.
+const LEAST_TOLERANCE: f64 = 1e-13;
 
 impl RodSettings {
     /// Checks the values.
@@ -93,8 +95,8 @@ impl RodSettings {
             let expected = format!("a whole number from 1 to {MOST_ELEMENTS}");
             return Err(InvalidInput::new("elements", expected, self.elements));
         }
-        if !(self.tolerance > 0.0 && self.tolerance <= 1e-3) {
-            let expected = "a number in (0, 1e-3]";
+        if !(LEAST_TOLERANCE..=1e-3).contains(&self.tolerance) {
+            let expected = format!("a number from {LEAST_TOLERANCE:e} to 1e-3");
             return Err(InvalidInput::new("tolerance", expected, format!("{:?}", self.tolerance)));
         }
         if self.max_iterations == 0 || self.max_iterations > 1_000_000 {

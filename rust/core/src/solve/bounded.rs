@@ -6,7 +6,8 @@
 
 use super::quadratic::{backward, cholesky, forward};
 
-/// Gradients below this share of the largest linear term count as zero.
+/// Gradients below this share of the largest linear term that pulls a variable off its bound count as zero: how far
+/// others are pushed onto theirs does not round those.
 const FLAT: f64 = 1e-14;
 
 /// Buffers, and the answer.
@@ -37,7 +38,8 @@ impl Bounded {
         self.step.resize(size, 0.0);
         self.free.clear();
         self.free.extend((0..size).filter(|k| first(*k)));
-        let flat = FLAT * right.iter().fold(0.0_f64, |most, r| most.max(r.abs()));
+        let pulls = right.iter().enumerate().map(|(k, r)| if first(k) { r.abs() } else { *r });
+        let flat = FLAT * pulls.fold(0.0_f64, f64::max);
         // A variable may come and go; each round lowers the value.
         for _ in 0..=4 * size + 4 {
             if !self.descend(&at, right, lower) {

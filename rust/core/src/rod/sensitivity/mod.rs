@@ -49,6 +49,9 @@ pub struct Variation {
 
 /// Lengths within this share of their bounds are at them.
 const AT_BOUND: f64 = 1e-9;
+/// What a tendon can do to the shape, as a share of what it could from holes a piece's length away, squared,
+/// when it is rounding.
+const LEVERLESS: f64 = 1e-24;
 
 /// A solved rod as its derivatives need it: factored, and without the robot.
 #[derive(Clone, Debug)]
@@ -124,6 +127,20 @@ impl Linearized {
                         || chain.over[*k].abs() <= AT_BOUND * plan.rest_lengths[*k])
             })
             .collect();
+        // One that crosses sides has no first derivative at rest: rounding is none.
+        let mut most = vec![0.0; tendons];
+        for (i, data) in plan.data.iter().enumerate() {
+            for p in plan.starts[i]..plan.starts[i + 1] {
+                let length = plan.piece_lengths[p];
+                most[plan.pieces[p].tendon] += length * length / data.stiffness[0];
+            }
+        }
+        let count = taut.len();
+        let taut: Vec<usize> = taut
+            .into_iter()
+            .filter(|k| chain.schur[k * (tendons + 1)] > LEVERLESS * most[*k])
+            .collect();
+        self.dependent |= taut.len() < count;
         self.equations =
             plan.pieces.iter().map(|p| taut.iter().position(|k| *k == p.tendon)).collect();
         let schur = DMatrix::from_fn(taut.len(), taut.len(), |a, b| {
