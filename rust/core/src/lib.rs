@@ -44,5 +44,5 @@ pub mod solve;
 mod status;
 
 pub use error::InvalidInput;
-pub use shape::Shape;
+pub use shape::{Contact, PointKind, Shape};
 pub use status::Status;
