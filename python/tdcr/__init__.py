@@ -46,6 +46,7 @@ from tdcr._core import (
 )
 from tdcr._core import __version__ as __version__
 from tdcr._dexterity import Manipulability, manipulability
+from tdcr._gripper import Grasp, Gripper
 from tdcr._inverse import (
     Inverse,
     InverseBatch,
@@ -67,6 +68,8 @@ __all__ = [
     "Contact",
     "Cylinder",
     "Gradient",
+    "Grasp",
+    "Gripper",
     "HalfSpace",
     "InvalidInput",
     "Inverse",

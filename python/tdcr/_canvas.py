@@ -289,11 +289,13 @@ def draw(canvas: Flat | Solid, scene: Scene, disks: bool, tendons: bool) -> None
         canvas.line(tendon.points[-1:], color=tendon.colour, marker="o", markersize=3.5, zorder=2.6)
 
 
-def draw_forces(canvas: Flat | Solid, scene: Scene) -> None:
+def draw_forces(canvas: Flat | Solid, scene: Scene, largest: float | None = None) -> None:
+    """Draw arrows, the one of the largest force (by default of this shape) of a fixed length."""
     forces = np.array([contact.force for contact in scene.shape.contacts]).reshape(-1, 3)
     sizes = np.linalg.norm(forces, axis=1)
-    if not sizes.size or not 0.0 < sizes.max() < np.inf:
+    largest = sizes.max(initial=0.0) if largest is None else largest
+    if not 0.0 < largest < np.inf:
         return
-    unit = 0.25 * scene.shape.robot.backbone.total_length * scene.scale / sizes.max()
+    unit = 0.25 * scene.shape.robot.backbone.total_length * scene.scale / largest
     for contact, force in zip(scene.shape.contacts, forces, strict=True):
         canvas.arrow(contact.point * scene.scale, force * unit)
