@@ -244,7 +244,7 @@ def forward_batch(
         As `forward`, before any row is solved and naming the row; an unknown field, a number of
         threads below 1, `warm` with another model than the rod.
     KeyboardInterrupt
-        On Ctrl-C, within about 0.1 s, or when the rows in work are done where there are obstacles.
+        On Ctrl-C, within about 0.1 s; among obstacles when the rows in work are done.
     Exception
         Whatever the function of a `SignedDistance` raises.
     """

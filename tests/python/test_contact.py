@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from interrupts import assert_interrupts
 
 import tdcr
 
@@ -394,3 +395,31 @@ def test_a_robot_that_sits_in_an_obstacle_says_so():
     shape = pulled(displacement=FREE, obstacles=tdcr.Sphere((0.012, 0, 0.1), 0.010)).require()
     assert "deep in obstacles[0]" in shape.message
     assert tdcr.clearance(shape.obstacles, shape.positions).min() > -1e-10
+
+
+# --- Ctrl-C ------------------------------------------------------------------------------------
+
+SETUP = """
+    import numpy as np, tdcr
+    robot = tdcr.Robot(tdcr.Backbone(0.18, 9), [tdcr.Tendon(0.0, 0.008)])
+    bar = tdcr.Cylinder((0.030, 0, 0.100), (0, 1, 0), 0.010)
+    rows = np.linspace(0, -0.006, 1_000_000)[:, None]
+    def slow(x):
+        for _ in range(100_000):
+            pass
+        return float(x[2]) + 1.0
+"""
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "tdcr.forward_batch(robot, rows, obstacles=bar, warm=True)",
+        "tdcr.forward_batch(robot, rows, obstacles=tdcr.SignedDistance(slow))",
+        "tdcr.forward(robot, [-0.006], obstacles=tdcr.SignedDistance(slow))",
+        "tdcr.Gripper([robot]).close([-0.006], bar, steps=100_000)",
+    ],
+    ids=["rows", "rows of a function", "function", "gripper"],
+)
+def test_ctrl_c_ends_it(call):
+    assert_interrupts(SETUP, call)

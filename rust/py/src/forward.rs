@@ -341,9 +341,14 @@ pub(crate) fn _forward_batch<'py>(
                 let scene = around.scene(core, &plan, &settings).map_err(|e| invalid(&e))?;
                 let rod = LoadedRod::new(core, &plan, &scene).map_err(|e| invalid(&e))?;
                 let fault = Mutex::new(None);
-                let solved = batch.solve(py, |stop| Watched::new(rod, stop, &fault), progress);
+                let watched = |stop| {
+                    around.stopped_by(&stop);
+                    Watched::new(rod, stop, &fault)
+                };
+                // After Ctrl-C, which is raised here, functions fail because of it.
+                let solved = batch.solve(py, watched, progress)?;
                 surroundings::checked(py, fault)?;
-                return export(py, &batch, solved?);
+                return export(py, &batch, solved);
             }
             let rod = |stop| Rod::new(core, &plan).stopped_by(stop);
             batch.solve(py, rod, progress)

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -24,7 +24,11 @@ pub(crate) struct Surroundings {
     pub(crate) given: Py<PyTuple>,
     obstacles: Vec<Obstacle>,
     pub(crate) loads: Option<Loads>,
+    stop: Stop,
 }
+
+/// The flag that ends a batch, once there is one.
+type Stop = Arc<OnceLock<Arc<AtomicBool>>>;
 
 impl Surroundings {
     /// From the arguments; nothing at all is an empty place.
@@ -37,9 +41,9 @@ impl Surroundings {
             Ok(loads) => Ok(loads.get().clone()),
             Err(_) => Err(wrong_type("loads", "Loads", value)),
         });
-        let loads = loads.transpose()?;
+        let (loads, stop) = (loads.transpose()?, Stop::default());
         let Some(given) = given else {
-            return Ok(Self { given: PyTuple::empty(py).unbind(), obstacles: vec![], loads });
+            return Ok(Self { given: PyTuple::empty(py).unbind(), obstacles: vec![], loads, stop });
         };
         let given = if given.is_instance_of::<crate::obstacle::Obstacle>() {
             PyTuple::new(py, [given])?
@@ -48,11 +52,16 @@ impl Surroundings {
             let items = given.try_iter().map_err(|_| wrong_type("obstacles", expected, given))?;
             PyTuple::new(py, items.collect::<PyResult<Vec<_>>>()?)?
         };
-        let mut all = obstacles("obstacles", &given)?;
-        if all.len() > 1 {
-            all = all.into_iter().enumerate().map(|(i, one)| named(one, i)).collect();
-        }
-        Ok(Self { given: given.unbind(), obstacles: all, loads })
+        let all = obstacles("obstacles", &given)?;
+        let one = all.len() == 1;
+        let all = all.into_iter().enumerate();
+        let all = all.map(|(i, obstacle)| listening(obstacle, (!one).then_some(i), &stop));
+        Ok(Self { given: given.unbind(), obstacles: all.collect(), loads, stop })
+    }
+
+    /// Functions fail from when the flag is set, in the midst of a solve.
+    pub(crate) fn stopped_by(&self, stop: &Arc<AtomicBool>) {
+        self.stop.get_or_init(|| Arc::clone(stop));
     }
 
     /// What there is, for those who do not take it: the name of the argument.
@@ -94,12 +103,20 @@ impl fmt::Display for Named {
 
 impl std::error::Error for Named {}
 
-/// A function that says whose its faults are; other volumes have none.
-fn named(obstacle: Obstacle, index: usize) -> Obstacle {
+/// A function that says whose its faults are, where there are several obstacles, and that listens to a flag.
+/// Other volumes have no faults and are quick.
+fn listening(obstacle: Obstacle, index: Option<usize>, stop: &Stop) -> Obstacle {
     let Volume::SignedDistance(function) = obstacle.volume() else { return obstacle };
     let solid = Obstacle::new(function.clone(), false);
+    let stop = Arc::clone(stop);
     let function = SignedDistance::new(Arc::new(move |x| {
-        let near = solid.nearest(x).map_err(|fault| Named { obstacle: index, fault })?;
+        if stop.get().is_some_and(|stop| stop.load(Ordering::SeqCst)) {
+            return Err("stopped".into());
+        }
+        let near = solid.nearest(x).map_err(|fault| match index {
+            Some(obstacle) => Box::new(Named { obstacle, fault }),
+            None => fault,
+        })?;
         Ok((near.distance, near.gradient))
     }));
     Obstacle::new(function, obstacle.inside())
@@ -136,8 +153,9 @@ impl<'r> Watched<'r> {
 
     fn watch(&self, work: &mut Workspace) {
         if let Some(fault) = work.take_fault() {
-            self.stop.store(true, Ordering::Relaxed);
             self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(fault);
+            // After that: what others fail with because of it comes too late.
+            self.stop.store(true, Ordering::SeqCst);
         }
     }
 }
