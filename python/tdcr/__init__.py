@@ -23,10 +23,12 @@ from tdcr._core import (
     Box,
     Capsule,
     ConstantCurvatureSettings,
+    Contact,
     Cylinder,
     HalfSpace,
     InverseSettings,
     LinkageSettings,
+    Loads,
     Mesh,
     Obstacle,
     PsoSettings,
@@ -44,6 +46,7 @@ from tdcr._core import (
 )
 from tdcr._core import __version__ as __version__
 from tdcr._dexterity import Manipulability, manipulability
+from tdcr._gripper import Grasp, Gripper
 from tdcr._inverse import (
     Inverse,
     InverseBatch,
@@ -62,14 +65,18 @@ __all__ = [
     "Box",
     "Capsule",
     "ConstantCurvatureSettings",
+    "Contact",
     "Cylinder",
     "Gradient",
+    "Grasp",
+    "Gripper",
     "HalfSpace",
     "InvalidInput",
     "Inverse",
     "InverseBatch",
     "InverseSettings",
     "LinkageSettings",
+    "Loads",
     "Manipulability",
     "Mesh",
     "NotConverged",

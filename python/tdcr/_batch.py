@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Sized
+from collections.abc import Callable, Iterable, Sequence, Sized
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from tdcr._core import (
         ConstantCurvatureSettings,
         LinkageSettings,
+        Loads,
+        Obstacle,
         Robot,
         RodSettings,
         Shape,
@@ -27,6 +29,20 @@ if TYPE_CHECKING:
 __all__ = ["ShapeBatch", "forward_batch"]
 
 FIELDS = _core._fields()
+
+_CONTACT = np.dtype(
+    [
+        ("row", np.int64),
+        ("disk", np.int64),
+        ("kind", "U6"),
+        ("tendon", np.int64),
+        ("obstacle", np.int64),
+        ("point", np.float64, 3),
+        ("normal", np.float64, 3),
+        ("gap", np.float64),
+        ("force", np.float64, 3),
+    ]
+)
 
 
 class ShapeBatch(Sequence["Shape"]):
@@ -44,6 +60,8 @@ class ShapeBatch(Sequence["Shape"]):
         Negative pulls [m].
     model : str
     settings : RodSettings, LinkageSettings or ConstantCurvatureSettings or None
+    obstacles : tuple of Obstacle
+    loads : Loads or None
     warm : bool
         Whether rows started from the row before.
     fields : tuple of str
@@ -65,6 +83,9 @@ class ShapeBatch(Sequence["Shape"]):
         As in `Shape`.
     energy : ndarray, shape (B,)
         As in `Shape`.
+    contacts : structured ndarray, one record per contact
+        Columns "row", in ascending order, and those of `Contact`: "disk", "kind", "tendon" (-1
+        where there is none), "obstacle", "point" [m], "normal", "gap" [m], "force".
     status : ndarray of Status, shape (B,)
     ok : ndarray of bool, shape (B,)
         Whether the row converged.
@@ -78,6 +99,8 @@ class ShapeBatch(Sequence["Shape"]):
         settings: Settings | None,
         columns: dict[str, Any],
         warm: bool = False,
+        obstacles: tuple[Obstacle, ...] = (),
+        loads: Loads | None = None,
     ) -> None:
         self.__dict__.update(
             robot=robot,
@@ -85,6 +108,8 @@ class ShapeBatch(Sequence["Shape"]):
             model=model,
             settings=settings,
             warm=warm,
+            obstacles=obstacles,
+            loads=loads,
             _columns=columns,
         )
 
@@ -93,6 +118,8 @@ class ShapeBatch(Sequence["Shape"]):
     model: str
     settings: Settings | None
     warm: bool
+    obstacles: tuple[Obstacle, ...]
+    loads: Loads | None
     _columns: dict[str, Any]
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -126,12 +153,13 @@ class ShapeBatch(Sequence["Shape"]):
         return tuple(name for name in FIELDS if name in self._columns)
 
     def __eq__(self, other: object) -> bool:
-        """Compare by value: the same robot, rows, model, settings, starts and computed fields."""
+        """Compare by value: robot, rows, model, settings, surroundings, starts, computed fields."""
         if not isinstance(other, ShapeBatch):
             return NotImplemented
         return (
             (self.robot, self.model, self.settings) == (other.robot, other.model, other.settings)
-            and self.warm == other.warm
+            and (self.warm, self.loads) == (other.warm, other.loads)
+            and self.obstacles == other.obstacles
             and np.array_equal(self.displacements, other.displacements)
             and self._columns.keys() == other._columns.keys()
             and all(same(mine, other._columns[name]) for name, mine in self._columns.items())
@@ -150,11 +178,12 @@ class ShapeBatch(Sequence["Shape"]):
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         row = range(len(self))[index]
+        settings: Any = self.settings
+        around: dict[str, Any] = {"obstacles": self.obstacles, "loads": self.loads}
         if self.warm:
-            settings: Any = self.settings
-            return _core._chained_shape(self.robot, self.displacements, row, settings)
+            return _core._chained_shape(self.robot, self.displacements, row, settings, **around)
         own = self.displacements[row]
-        return _core.forward(self.robot, own, model=self.model, settings=self.settings)
+        return _core.forward(self.robot, own, model=self.model, settings=settings, **around)
 
     def __repr__(self) -> str:
         """Tell size, outcome and fields."""
@@ -170,6 +199,8 @@ def forward_batch(
     displacements: ArrayLike,
     *,
     model: str = "rod",
+    obstacles: Obstacle | Iterable[Obstacle] = (),
+    loads: Loads | None = None,
     settings: Settings | None = None,
     fields: Sequence[str] = ("tip",),
     warm: bool = False,
@@ -178,16 +209,19 @@ def forward_batch(
 ) -> ShapeBatch:
     """Solve many displacements on all cores, with the GIL released.
 
+    Python functions of a `SignedDistance` take the GIL whenever they are called.
+
     Parameters
     ----------
     robot : Robot
     displacements : array_like, shape (B, K)
         One row per solve, as for `forward` [m].
-    model, settings
+    model, obstacles, loads, settings
         As for `forward`.
     fields : sequence of str, optional
         What to compute of "tip", "frames", "positions", "strains", "tendon_points",
-        "tendon_lengths", "tensions", "energy". Status, residual and iterations always are.
+        "tendon_lengths", "tensions", "energy", "contacts". Status, residual and iterations always
+        are.
     warm : bool, optional
         Whether a row starts from the solution of the row before, not from rest: faster where
         neighbours are alike, as on a path. Model "rod" only. The first row of every 64 starts from
@@ -210,20 +244,41 @@ def forward_batch(
         As `forward`, before any row is solved and naming the row; an unknown field, a number of
         threads below 1, `warm` with another model than the rod.
     KeyboardInterrupt
-        On Ctrl-C, within about 0.1 s.
+        On Ctrl-C, within about 0.1 s; among obstacles when the rows in work are done.
+    Exception
+        Whatever the function of a `SignedDistance` raises.
     """
     if isinstance(fields, str):
         fields = (fields,)
+    if isinstance(obstacles, _core.Obstacle):
+        obstacles = (obstacles,)
+    elif isinstance(obstacles, Iterable):
+        # Once: each row's shape is made of them again. What is no obstacle the core refuses.
+        obstacles = tuple(obstacles)
     total = len(displacements) if isinstance(displacements, Sized) else None
     with told(progress, "forward_batch", total) as tell:
         columns = _core._forward_batch(
             robot,
             displacements,
             model=model,
+            obstacles=obstacles,
+            loads=loads,
             settings=settings,
             fields=list(fields),
             threads=threads,
             progress=tell,
             warm=warm,
         )
-    return ShapeBatch(robot, columns.pop("displacements"), model, settings, columns, warm)
+    if "contacts" in columns:
+        columns["contacts"] = _table(columns["contacts"])
+    given = columns.pop("displacements")
+    return ShapeBatch(robot, given, model, settings, columns, warm, obstacles, loads)
+
+
+def _table(columns: dict[str, Any]) -> NDArray[np.void]:
+    """Make records of the columns of contacts."""
+    table = np.empty(len(columns["row"]), _CONTACT)
+    for name, values in columns.items():
+        table[name] = values
+    table.flags.writeable = False
+    return table

@@ -15,10 +15,12 @@ __all__ = [
     "Box",
     "Capsule",
     "ConstantCurvatureSettings",
+    "Contact",
     "Cylinder",
     "HalfSpace",
     "InverseSettings",
     "LinkageSettings",
+    "Loads",
     "Mesh",
     "Obstacle",
     "PsoSettings",
@@ -361,6 +363,7 @@ class RodSettings:
         axial: bool = False,
         tolerance: float = 1e-11,
         max_iterations: int = 600,
+        body_radius: float = 0.0,
     ) -> Self: ...
     @property
     def subsegment(self) -> str: ...
@@ -374,6 +377,8 @@ class RodSettings:
     def tolerance(self) -> float: ...
     @property
     def max_iterations(self) -> int: ...
+    @property
+    def body_radius(self) -> float: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -467,6 +472,69 @@ class PsoSettings:
     def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
 
 @final
+class Loads:
+    def __new__(
+        cls,
+        *,
+        gravity: ArrayLike = (0.0, 0.0, -9.81),
+        backbone_density: float = 0.0,
+        disk_mass: float = 0.0,
+        tip_force: ArrayLike | None = None,
+        tip_moment: ArrayLike | None = None,
+        disk_forces: ArrayLike | None = None,
+    ) -> Self: ...
+    @property
+    def gravity(self) -> _Array: ...
+    @property
+    def backbone_density(self) -> float: ...
+    @property
+    def disk_mass(self) -> float: ...
+    @property
+    def tip_force(self) -> _Array: ...
+    @property
+    def tip_moment(self) -> _Array: ...
+    @property
+    def disk_forces(self) -> _Array | None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class Contact:
+    def __new__(
+        cls,
+        disk: int,
+        kind: str,
+        tendon: int | None,
+        obstacle: int,
+        point: ArrayLike,
+        normal: ArrayLike,
+        gap: float,
+        force: ArrayLike,
+    ) -> Self: ...
+    @property
+    def disk(self) -> int: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def tendon(self) -> int | None: ...
+    @property
+    def obstacle(self) -> int: ...
+    @property
+    def point(self) -> _Array: ...
+    @property
+    def normal(self) -> _Array: ...
+    @property
+    def gap(self) -> float: ...
+    @property
+    def force(self) -> _Array: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+
+@final
 class Shape:
     @property
     def robot(self) -> Robot: ...
@@ -491,7 +559,11 @@ class Shape:
     @property
     def tensions(self) -> _Array: ...
     @property
-    def contacts(self) -> list[Any]: ...
+    def contacts(self) -> list[Contact]: ...
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]: ...
+    @property
+    def loads(self) -> Loads | None: ...
     @property
     def energy(self) -> float: ...
     @property
@@ -601,6 +673,8 @@ def forward(
     *,
     tensions: ArrayLike | None = None,
     model: str = "rod",
+    obstacles: Obstacle | Iterable[Obstacle] = (),
+    loads: Loads | None = None,
     settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None = None,
     start: Shape | None = None,
 ) -> Shape: ...
@@ -619,6 +693,8 @@ def _forward_batch(
     displacements: ArrayLike,
     *,
     model: str,
+    obstacles: Obstacle | Iterable[Obstacle],
+    loads: Loads | None,
     settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None,
     fields: list[str],
     threads: int | None,
@@ -626,7 +702,12 @@ def _forward_batch(
     warm: bool,
 ) -> dict[str, Any]: ...
 def _chained_shape(
-    robot: Robot, displacements: ArrayLike, row: int, settings: RodSettings | None
+    robot: Robot,
+    displacements: ArrayLike,
+    row: int,
+    settings: RodSettings | None,
+    obstacles: Obstacle | Iterable[Obstacle],
+    loads: Loads | None,
 ) -> Shape: ...
 def _inverse(
     robot: Robot,
@@ -803,4 +884,5 @@ def _shape(
     tensions: ArrayLike,
     energy: float,
     outcome: tuple[str, str, float, int],
+    around: tuple[tuple[Obstacle, ...], Loads | None, list[Contact]],
 ) -> Shape: ...

@@ -10,6 +10,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
+import tdcr
 from tdcr import Backbone, InvalidInput, Robot, Tendon, forward
 from tdcr._view import plane_of, smooth
 
@@ -20,6 +21,7 @@ from matplotlib import pyplot  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
 from tdcr._plot import plot_shape, save_picture  # noqa: E402
+from tdcr._plot_obstacles import surface  # noqa: E402
 
 INF = math.inf
 
@@ -188,3 +190,73 @@ def test_the_smooth_line_is_close_to_the_arc():
     curve = smooth(frames)
     assert curve.shape == (6 * 8 + 1, 3)
     assert np.hypot(curve[:, 0] - 1, curve[:, 2]) == pytest.approx(np.ones(49), abs=1e-5)
+
+
+# --- obstacles and contact ------------------------------------------------------------------------
+
+
+def leaning(obstacles, turns=0.0):
+    tendon = Tendon.helical(math.pi, 0.008, turns=turns) if turns else Tendon(math.pi, 0.008)
+    trunk = Robot(Backbone(0.18, 9, youngs_modulus=200e9, diameter=0.001), [tendon])
+    return forward(trunk, [-0.008], obstacles=obstacles).require()
+
+
+def test_a_plane_cuts_obstacles_and_shows_forces():
+    bar = tdcr.Cylinder((-0.03, 0, 0.1), (0, 1, 0), 0.015)
+    shape = leaning([bar])
+    ax = plot_shape(shape)
+    (contact,) = shape.contacts
+    size = np.linalg.norm(contact.force)
+    assert ax.get_title().endswith(f"1 contact, at most {size:.3g} N")
+    (arrow,) = [each for each in ax.collections if hasattr(each, "U")]
+    assert (arrow.X[0], arrow.Y[0]) == pytest.approx(1000 * contact.point[[0, 2]])
+    assert np.hypot(arrow.U, arrow.V) == pytest.approx(0.25 * 180)
+    rim = np.concatenate([p.vertices for each in ax.collections for p in each.get_paths()])
+    on_the_bar = np.abs(np.hypot(rim[:, 0] + 30, rim[:, 1] - 100) - 15) < 0.1
+    assert on_the_bar.sum() > 50
+    plain = plot_shape(shape, obstacles=False, contacts=False)
+    assert not plain.collections
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_the_surface_of_an_obstacle_is_where_its_distance_is_zero(inside):
+    turn = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]])
+    low, high = np.full(3, -0.1), np.full(3, 0.2)
+    corners = np.array([[0, 0, 0], [0.05, 0, 0], [0, 0.05, 0], [0, 0, 0.05]])
+    faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    for obstacle, far in (
+        (tdcr.Sphere((0.02, 0, 0.1), 0.03, inside=inside), 2e-4),
+        (tdcr.Cylinder((0, 0, 0), (1, 2, 3), 0.02, inside=inside), 2e-4),
+        (tdcr.Capsule((0, 0, 0), (0.05, 0, 0.05), 0.01, inside=inside), 2e-4),
+        (tdcr.HalfSpace((0, 0, 0.01), (0, 1, 5), inside=inside), 1e-12),
+        (tdcr.Box((0, 0, 0.05), (0.02, 0.03, 0.04), turn, inside=inside), 1e-12),
+        (tdcr.Mesh(corners, faces, inside=inside), 1e-12),
+    ):
+        polygons = surface(obstacle, low, high)
+        assert len(polygons) > 3
+        middles = polygons.mean(axis=1)
+        assert np.abs(obstacle.distance(middles)).max() < far
+        assert (middles >= low).all()
+        assert (middles <= high).all()
+        assert len(surface(obstacle, low + 5, high + 5)) == 0 or isinstance(
+            obstacle, tdcr.HalfSpace
+        )
+    assert surface(tdcr.SignedDistance(abs), low, high) is None
+
+
+def test_space_shows_obstacles_of_every_kind():
+    sphere = tdcr.Sphere((-0.04, 0, 0.1), 0.03)
+    around = tdcr.Cylinder((0, 0, 0), (0, 0, 1), 0.2, inside=True)
+    bowl = tdcr.SignedDistance(lambda x: float(x[2]) + 0.05)
+    shape = leaning([sphere, around, bowl], turns=0.5)
+    assert shape.contacts
+    ax = plot_shape(shape)
+    assert ax.name == "3d"
+    assert ax.get_xlim()[1] - ax.get_xlim()[0] < 300
+    assert "contact" in ax.get_title()
+    with_all = len(ax.collections)
+    assert with_all > len(plot_shape(shape, obstacles=False).collections)
+    assert with_all > len(plot_shape(shape, contacts=False).collections)
+    # Without contact there is nothing to draw, and the title says so.
+    far = forward(robot(), [-0.01, INF, INF, INF], obstacles=tdcr.Sphere((1, 1, 1), 0.01))
+    assert plot_shape(far).get_title().endswith("no contact")

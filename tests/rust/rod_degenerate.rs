@@ -265,6 +265,8 @@ fn input_that_makes_no_sense_is_refused() {
         (RodSettings { tolerance: 1e-16, ..default() }, "tolerance"),
         (RodSettings { tolerance: f64::NAN, ..default() }, "tolerance"),
         (RodSettings { max_iterations: 0, ..default() }, "max_iterations"),
+        (RodSettings { body_radius: -1e-9, ..default() }, "body_radius"),
+        (RodSettings { body_radius: f64::NAN, ..default() }, "body_radius"),
     ] {
         assert_eq!(Plan::new(&trunk, wrong).unwrap_err().argument, name);
     }

@@ -17,6 +17,9 @@ pub enum PointKind {
 }
 
 impl PointKind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Center, Self::Hole, Self::Mirror];
+
     /// The name used in Python.
     #[must_use]
     pub const fn as_str(self) -> &'static str {

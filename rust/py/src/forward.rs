@@ -1,7 +1,7 @@
 //! `forward` and the engine of `forward_batch`.
 
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
 
 use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyTypeError;
@@ -14,16 +14,19 @@ use tdcr::batch::{Field, Key, Solved, chain_rows, pool, solve_rows};
 use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings};
 use tdcr::linkage::{Linkage, LinkageSettings};
 use tdcr::model::Model;
+use tdcr::rod::contact::LoadedRod;
 use tdcr::rod::{Rod, RodSettings};
 use tdcr::{InvalidInput, Status};
 
 use crate::arguments::{optional, whole};
+use crate::contact;
 use crate::convert::{float_array, frozen, invalid, status, type_name, values, wrong_shape};
 use crate::long_call;
 use crate::robot::Robot;
 use crate::rod::{self, Load};
 use crate::settings;
 use crate::shape::Shape;
+use crate::surroundings::{self, Surroundings, Watched};
 
 /// From tendon displacements, or tensions, to the shape.
 ///
@@ -49,11 +52,18 @@ use crate::shape::Shape;
 ///     "constant_curvature": every segment an arc, by least squares over all its tendons
 ///     (opencontinuumrobotics.com). Bilateral: displacements count as given, but for free tendons and
 ///     the only, released one of a segment. Straight backbones and straight routing only.
+/// obstacles : Obstacle or sequence of Obstacle, optional
+///     What the robot stays out of, or inside of: its disks' centres, holes and the places opposite to the
+///     holes, and a body around the backbone by `RodSettings.body_radius`. Frictionless. Model "rod" with
+///     sliding tendons and displacements only.
+/// loads : Loads, optional
+///     Weight, forces and moments on the robot. As obstacles, and only with Young's modulus and diameter.
 /// settings : RodSettings, LinkageSettings or ConstantCurvatureSettings, optional
 ///     Those of the model.
 /// start : Shape, optional
 ///     A shape of this robot and model "rod" with as many elements, under displacements near by: the
-///     solve starts there, not at rest. A start that does not help is dropped.
+///     solve starts there, not at rest. A start that does not help is dropped. It may have had other obstacles
+///     and loads.
 ///
 /// Returns
 /// -------
@@ -64,24 +74,35 @@ use crate::shape::Shape;
 /// ------
 /// InvalidInput
 ///     Both or neither of displacements and tensions, NaN, -inf, another number of values than
-///     tendons, a (B, K) array, a negative or infinite tension, tensions or a start for another model
-///     than the rod, a start of another robot, model or number of elements, an unknown model, settings of
+///     tendons, a (B, K) array, a negative or infinite tension, tensions, obstacles, loads or a start for
+///     another model than the rod, tensions or proportional tendons with obstacles or loads, loads without
+///     Young's modulus or with another number of `disk_forces` than disks, a start of another robot, model or number of elements, an unknown model, settings of
 ///     another model, axial strain or elastic tendons without Young's modulus; in the models that take
 ///     no others a pre-bent backbone, a routing, two linkage tendons on one azimuth.
 /// TypeError
 ///     A value of another type.
+/// Exception
+///     Whatever the function of a `SignedDistance` raises, with a note that names the obstacle where there are
+///     several; a value of it that is no finite number is InvalidInput.
 #[pyfunction]
-#[pyo3(signature = (robot, displacements=None, *, tensions=None, model="rod", settings=None, start=None))]
+#[pyo3(signature = (robot, displacements=None, *, tensions=None, model="rod", obstacles=None, loads=None,
+    settings=None, start=None),
+    text_signature = "(robot, displacements=None, *, tensions=None, model='rod', obstacles=(), loads=None, \
+    settings=None, start=None)")]
+#[allow(clippy::too_many_arguments)] // Keywords.
 pub(crate) fn forward(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
     displacements: Option<&Bound<'_, PyAny>>,
     tensions: Option<&Bound<'_, PyAny>>,
     model: &str,
+    obstacles: Option<&Bound<'_, PyAny>>,
+    loads: Option<&Bound<'_, PyAny>>,
     settings: Option<&Bound<'_, PyAny>>,
     start: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Shape> {
     let choice = Choice::new(model, settings)?;
+    let around = Surroundings::new(py, obstacles, loads)?;
     let load = load(robot, displacements, tensions)?;
     let solved = robot.get();
     let core = &solved.0;
@@ -93,8 +114,23 @@ pub(crate) fn forward(
             }
             let start = start.map(|start| rod::start(core, &settings, start)).transpose()?;
             let plan = solved.rod_plan(settings).map_err(|e| invalid(&e))?;
-            rod::run(py, core, &plan, |rod| rod::solve(rod, load, start))?
+            match (around.any(), load) {
+                (None, load) => rod::run(py, core, &plan, |rod| rod::solve(rod, load, start))?,
+                (Some(what), Load::Tensions(_)) => {
+                    let expected = format!("displacements where there are {what}");
+                    return Err(invalid(&InvalidInput::new("tensions", expected, "tensions")));
+                }
+                (Some(_), Load::Displacements(displacements)) => {
+                    let scene = around.scene(core, &plan, &settings).map_err(|e| invalid(&e))?;
+                    let shape = surroundings::solve(py, core, &plan, &scene, |rod| match start {
+                        Some(start) => rod.shape_from(&start, &displacements),
+                        None => rod.shape(&displacements),
+                    })?;
+                    Ok((displacements, shape))
+                }
+            }
         }
+        _ if around.any().is_some() => return Err(not_around(&around, model)),
         (_, Load::Tensions(_)) => return Err(rod_only("tensions", model)),
         _ if start.is_some() => return Err(rod_only("start", model)),
         (Choice::Linkage(settings), Load::Displacements(displacements)) => py.detach(|| {
@@ -111,7 +147,12 @@ pub(crate) fn forward(
         }
     }
     .map_err(|e| invalid(&e))?;
-    Ok(Shape::new(solved.clone(), choice, displacements, shape))
+    Ok(Shape::new(solved.clone(), choice, displacements, shape).among(around))
+}
+
+/// Obstacles or loads for a model that knows no forces.
+fn not_around(around: &Surroundings, model: &str) -> PyErr {
+    rod_only(around.any().unwrap_or("obstacles"), model)
 }
 
 /// What is given: displacements or tensions, not both.
@@ -250,13 +291,16 @@ pub(crate) fn _fields(py: Python<'_>) -> PyResult<Bound<'_, PyTuple>> {
 
 /// Columns of a batch by field name; `tdcr.forward_batch` is the face of it.
 #[pyfunction]
-#[pyo3(signature = (robot, displacements, *, model, settings, fields, threads, progress, warm))]
+#[pyo3(signature = (robot, displacements, *, model, obstacles, loads, settings, fields, threads, progress,
+    warm))]
 #[allow(clippy::too_many_arguments)] // The keywords of forward_batch.
 pub(crate) fn _forward_batch<'py>(
     py: Python<'py>,
     robot: &Bound<'py, Robot>,
     displacements: &Bound<'py, PyAny>,
     model: &str,
+    obstacles: &Bound<'py, PyAny>,
+    loads: Option<&Bound<'py, PyAny>>,
     settings: Option<&Bound<'py, PyAny>>,
     fields: Vec<String>,
     threads: Option<&Bound<'py, PyAny>>,
@@ -267,6 +311,10 @@ pub(crate) fn _forward_batch<'py>(
     if warm && !matches!(choice, Choice::Rod(_)) {
         let got = format!("True for model \"{model}\"");
         return Err(invalid(&InvalidInput::new("warm", "False, or model \"rod\"", got)));
+    }
+    let around = Surroundings::new(py, Some(obstacles), loads)?;
+    if around.any().is_some() && !matches!(choice, Choice::Rod(_)) {
+        return Err(not_around(&around, model));
     }
     let core = &robot.get().0;
     let tendons = core.tendons().len();
@@ -284,11 +332,24 @@ pub(crate) fn _forward_batch<'py>(
     let threads = optional("threads", threads, whole)?;
     let pool = pool(threads).map_err(|e| invalid(&e))?;
     let flat = values(&array)?;
-    let batch = Batch { displacements: flat, rows, fields: &fields, pool: &pool, warm };
+    let batch = Batch { displacements: flat, rows, tendons, fields: &fields, pool: &pool, warm };
     let kept = robot.get();
     let solved = match choice {
         Choice::Rod(settings) => {
             let plan = kept.rod_plan(settings).map_err(|e| invalid(&e))?;
+            if around.any().is_some() {
+                let scene = around.scene(core, &plan, &settings).map_err(|e| invalid(&e))?;
+                let rod = LoadedRod::new(core, &plan, &scene).map_err(|e| invalid(&e))?;
+                let fault = Mutex::new(None);
+                let watched = |stop| {
+                    around.stopped_by(&stop);
+                    Watched::new(rod, stop, &fault)
+                };
+                // After Ctrl-C, which is raised here, functions fail because of it.
+                let solved = batch.solve(py, watched, progress)?;
+                surroundings::checked(py, fault)?;
+                return export(py, &batch, solved);
+            }
             let rod = |stop| Rod::new(core, &plan).stopped_by(stop);
             batch.solve(py, rod, progress)
         }
@@ -302,15 +363,14 @@ pub(crate) fn _forward_batch<'py>(
             batch.solve(py, |_| ConstantCurvature::new(core, plan), progress)
         }
     }?;
-    let answer = export(py, &fields, solved)?;
-    answer.set_item("displacements", frozen(py, flat.to_vec(), &[rows, tendons])?)?;
-    Ok(answer)
+    export(py, &batch, solved)
 }
 
 /// What all models' batches have.
 struct Batch<'a> {
     displacements: &'a [f64],
     rows: usize,
+    tendons: usize,
     fields: &'a [Field],
     pool: &'a ThreadPool,
     warm: bool,
@@ -324,7 +384,7 @@ impl Batch<'_> {
         model: impl FnOnce(Arc<AtomicBool>) -> M + Send,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Solved> {
-        let &Self { displacements, rows, fields, pool, warm } = self;
+        let &Self { displacements, rows, fields, pool, warm, .. } = self;
         let solve = if warm { chain_rows } else { solve_rows };
         let solved = long_call::run(py, progress, |control| {
             solve(&model(Arc::clone(&control.stop)), displacements, rows, fields, pool, control)
@@ -334,9 +394,13 @@ impl Batch<'_> {
     }
 }
 
-fn export<'py>(py: Python<'py>, fields: &[Field], solved: Solved) -> PyResult<Bound<'py, PyDict>> {
-    let rows = solved.reports.len();
+fn export<'py>(py: Python<'py>, batch: &Batch<'_>, solved: Solved) -> PyResult<Bound<'py, PyDict>> {
+    let &Batch { displacements, rows, tendons, fields, .. } = batch;
     let answer = PyDict::new(py);
+    answer.set_item("displacements", frozen(py, displacements.to_vec(), &[rows, tendons])?)?;
+    if fields.contains(&Field::Contacts) {
+        answer.set_item(Field::Contacts.as_str(), contact::table(py, &solved.contacts)?)?;
+    }
     if fields.contains(&Field::TendonPoints) {
         answer.set_item(Field::TendonPoints.as_str(), PyList::empty(py))?;
     }

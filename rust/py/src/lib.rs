@@ -11,9 +11,11 @@ mod arguments;
 mod backbone;
 mod bounds;
 mod constant_curvature;
+mod contact;
 mod convert;
 mod forward;
 mod inverse;
+mod loads;
 mod long_call;
 mod mesh;
 mod obstacle;
@@ -27,6 +29,7 @@ mod sensitivity;
 mod settings;
 mod shape;
 mod signed_distance;
+mod surroundings;
 mod tendon;
 mod volumes;
 
@@ -44,9 +47,13 @@ mod _core {
         _arc_frames, _arc_from_displacements, _arc_jacobian, _displacements_from_arc,
     };
     #[pymodule_export]
+    use crate::contact::Contact;
+    #[pymodule_export]
     use crate::forward::{_fields, _forward_batch, forward};
     #[pymodule_export]
     use crate::inverse::{_inverse, _inverse_batch, _inverse_solutions};
+    #[pymodule_export]
+    use crate::loads::Loads;
     #[pymodule_export]
     use crate::mesh::Mesh;
     #[pymodule_export]

@@ -20,6 +20,7 @@ use crate::forward::Choice;
 use crate::long_call;
 use crate::robot::Robot as PyRobot;
 use crate::shape::Shape;
+use crate::surroundings::{self, Surroundings};
 
 /// Choices of the rod model.
 ///
@@ -40,6 +41,9 @@ use crate::shape::Shape;
 ///     Relative residual of forces and lengths that counts as solved, 1e-13 to 1e-3.
 /// max_iterations : int, optional
 ///     Evaluations of the whole rod at most, each of which ends in a Newton step.
+/// body_radius : float, optional
+///     Radius of a body around the backbone, which keeps clear of obstacles at the disks' centres [m]. 0:
+///     only the centres themselves, the tendons' holes and the places opposite to these do.
 ///
 /// Raises
 /// ------
@@ -73,7 +77,8 @@ fn named<T: Copy>(
 #[pymethods]
 impl RodSettings {
     #[new]
-    #[pyo3(signature = (*, subsegment="arc", tendons="sliding", elements=1, axial=false, tolerance=1e-11, max_iterations=600))]
+    #[pyo3(signature = (*, subsegment="arc", tendons="sliding", elements=1, axial=false, tolerance=1e-11,
+        max_iterations=600, body_radius=0.0))]
     fn new(
         subsegment: &str,
         tendons: &str,
@@ -81,11 +86,21 @@ impl RodSettings {
         axial: bool,
         tolerance: f64,
         #[pyo3(from_py_with = max_iterations)] max_iterations: usize,
+        body_radius: f64,
     ) -> PyResult<Self> {
         let subsegment = named("subsegment", Subsegment::ALL, Subsegment::as_str, subsegment)?;
         let tendons = named("tendons", TendonRule::ALL, TendonRule::as_str, tendons)?;
-        let settings =
-            rod::RodSettings { subsegment, tendons, axial, elements, tolerance, max_iterations };
+        // Adding 0.0 turns -0.0, which is equal to it, into 0.0.
+        let body_radius = body_radius + 0.0;
+        let settings = rod::RodSettings {
+            subsegment,
+            tendons,
+            axial,
+            elements,
+            tolerance,
+            max_iterations,
+            body_radius,
+        };
         settings.validate().map_err(|e| invalid(&e))?;
         Ok(Self(settings))
     }
@@ -126,12 +141,19 @@ impl RodSettings {
         self.0.max_iterations
     }
 
+    /// Radius of a body around the backbone that keeps clear of obstacles [m].
+    #[getter]
+    fn body_radius(&self) -> f64 {
+        self.0.body_radius
+    }
+
     fn __hash__(&self) -> u64 {
         let settings = &self.0;
         let mut hasher = DefaultHasher::new();
         (settings.subsegment, settings.tendons, settings.axial).hash(&mut hasher);
         (settings.elements, settings.max_iterations).hash(&mut hasher);
         settings.tolerance.to_bits().hash(&mut hasher);
+        settings.body_radius.to_bits().hash(&mut hasher);
         hasher.finish()
     }
 
@@ -164,6 +186,7 @@ pub(crate) fn keywords<'py>(
     keywords.set_item("axial", settings.axial)?;
     keywords.set_item("tolerance", settings.tolerance)?;
     keywords.set_item("max_iterations", settings.max_iterations)?;
+    keywords.set_item("body_radius", settings.body_radius)?;
     Ok(keywords)
 }
 
@@ -263,6 +286,8 @@ pub(crate) fn _chained_shape(
     displacements: &Bound<'_, PyAny>,
     row: usize,
     settings: Option<&Bound<'_, RodSettings>>,
+    obstacles: &Bound<'_, PyAny>,
+    loads: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Shape> {
     let settings = settings.map_or_else(Default::default, |settings| settings.get().0);
     let array = float_array("displacements", displacements)?;
@@ -274,8 +299,14 @@ pub(crate) fn _chained_shape(
         return Err(wrong_shape("displacements", &expected, array.shape()));
     }
     let plan = robot.get().rod_plan(settings).map_err(|e| invalid(&e))?;
-    let shape = run(py, core, &plan, |rod| chained_shape(rod, flat, row))?;
+    let around = Surroundings::new(py, Some(obstacles), loads)?;
+    let shape = if around.any().is_some() {
+        let scene = around.scene(core, &plan, &settings).map_err(|e| invalid(&e))?;
+        surroundings::solve(py, core, &plan, &scene, |rod| chained_shape(rod, flat, row))?
+    } else {
+        let shape = run(py, core, &plan, |rod| chained_shape(rod, flat, row))?;
+        shape.map_err(|e| invalid(&e))?
+    };
     let own = flat[row * tendons..(row + 1) * tendons].to_vec();
-    let shape = shape.map_err(|e| invalid(&e))?;
-    Ok(Shape::new(robot.get().clone(), Choice::Rod(settings), own, shape))
+    Ok(Shape::new(robot.get().clone(), Choice::Rod(settings), own, shape).among(around))
 }

@@ -22,6 +22,7 @@ use crate::forward::{Choice, one_row, rod_only};
 use crate::robot::Robot;
 use crate::rod;
 use crate::shape::Shape;
+use crate::surroundings::Surroundings;
 
 /// Velocity of the tool point per metre of tendon displacement.
 ///
@@ -132,7 +133,7 @@ fn frozen_columns(py: Python<'_>, matrix: &Matrix6xX<f64>) -> PyResult<Py<PyAny>
 /// Raises
 /// ------
 /// InvalidInput
-///     A shape of another model.
+///     A shape of another model, or one among obstacles or under loads.
 /// NotConverged
 ///     A shape that did not converge.
 /// TypeError
@@ -158,6 +159,10 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
         let got = format!("one of model \"{}\"", own.model());
         return Err(invalid(&InvalidInput::new("shape", "a shape of model \"rod\"", got)));
     };
+    if let Some(what) = own.around().and_then(Surroundings::any) {
+        let expected = "a shape without obstacles and loads";
+        return Err(invalid(&InvalidInput::new("shape", expected, format!("one with {what}"))));
+    }
     if !own.ok() {
         return Err(Shape::not_converged(shape));
     }
@@ -187,7 +192,7 @@ pub(crate) struct Sensitivity {
 
 impl PartialEq for Sensitivity {
     fn eq(&self, other: &Self) -> bool {
-        self.shape.get() == other.shape.get()
+        self.shape.get().same(other.shape.get())
     }
 }
 

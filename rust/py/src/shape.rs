@@ -11,19 +11,24 @@ use tdcr::Status;
 use tdcr::lie::Pose;
 use tdcr::model::{Report, State};
 
+use crate::contact::Contact;
 use crate::convert::{Lazy, float_array, frozen, frozen_frames, frozen_points, status, values};
 use crate::forward::Choice;
+use crate::loads::Loads;
 use crate::robot::Robot;
+use crate::surroundings::Surroundings;
 
 /// The shape of a robot, as a forward model found it. A solve that did not converge carries its
 /// last iterate, a status and a message. Arrays are in the world frame, read-only and built once,
 /// on first access.
-#[pyclass(frozen, eq, module = "tdcr")]
+#[pyclass(frozen, module = "tdcr")]
 pub(crate) struct Shape {
     robot: Robot,
     choice: Choice,
     displacements: Vec<f64>,
     core: tdcr::Shape,
+    /// None where there is nothing.
+    around: Option<Surroundings>,
     arrays: Arrays,
 }
 
@@ -46,7 +51,16 @@ impl Shape {
         displacements: Vec<f64>,
         core: tdcr::Shape,
     ) -> Self {
-        Self { robot, choice, displacements, core, arrays: Arrays::default() }
+        Self { robot, choice, displacements, core, around: None, arrays: Arrays::default() }
+    }
+
+    /// The same, solved among obstacles and under loads.
+    pub(crate) fn among(self, around: Surroundings) -> Self {
+        Self { around: around.any().is_some().then_some(around), ..self }
+    }
+
+    pub(crate) fn around(&self) -> Option<&Surroundings> {
+        self.around.as_ref()
     }
 
     pub(crate) const fn choice(&self) -> Choice {
@@ -84,8 +98,9 @@ fn same_bits(a: &[f64], b: &[f64]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
-impl PartialEq for Shape {
-    fn eq(&self, other: &Self) -> bool {
+impl Shape {
+    /// Equal but for the surroundings.
+    pub(crate) fn same(&self, other: &Self) -> bool {
         let (a, b) = (&self.core, &other.core);
         self.robot == other.robot
             && self.choice == other.choice
@@ -94,6 +109,7 @@ impl PartialEq for Shape {
             && a.state.strains == b.state.strains
             && same_bits(&a.state.elongations, &b.state.elongations)
             && same_bits(&a.state.tensions, &b.state.tensions)
+            && a.state.contacts == b.state.contacts
             && a.report.status == b.report.status
     }
 }
@@ -195,10 +211,23 @@ impl Shape {
         self.arrays.tensions.get(py, build)
     }
 
-    /// Contacts with obstacles: list, empty in models without obstacles.
+    /// Where it touches obstacles: list of Contact, base first.
     #[getter]
-    fn contacts<'py>(&self, py: Python<'py>) -> Bound<'py, PyList> {
-        PyList::empty(py)
+    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        PyList::new(py, self.core.state.contacts.iter().map(|contact| Contact(*contact)))
+    }
+
+    /// The obstacles it was solved among: tuple of Obstacle.
+    #[getter]
+    fn obstacles(&self, py: Python<'_>) -> Py<PyTuple> {
+        let given = self.around.as_ref().map(|around| around.given.clone_ref(py));
+        given.unwrap_or_else(|| PyTuple::empty(py).unbind())
+    }
+
+    /// The loads it was solved under: Loads, or None.
+    #[getter]
+    fn loads(&self) -> Option<Loads> {
+        self.around.as_ref().and_then(|around| around.loads.clone())
     }
 
     /// Strain energy of the backbone [J, or 1/m when `units` is "EI"].
@@ -266,7 +295,7 @@ impl Shape {
     ///     Axes to draw into, plain or 3-D. Default: those of a new figure.
     /// view : {"auto", "2d", "3d"}, optional
     ///     "auto" is the plane of the bend where the shape stays in one.
-    /// disks, tendons, legend : bool, optional
+    /// disks, tendons, obstacles, contacts, legend : bool, optional
     ///     What is drawn.
     /// title : str, optional
     ///     Default: name of the robot, model and status.
@@ -292,6 +321,18 @@ impl Shape {
         slf.py().import("tdcr._plot")?.getattr("plot_shape")?.call((slf,), options)
     }
 
+    /// Equal by value: robot, model, settings, displacements, surroundings and answer.
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> PyResult<bool> {
+        let Ok(other) = other.cast::<Self>() else { return Ok(false) };
+        let other = other.get();
+        let around = match (&self.around, &other.around) {
+            (None, None) => true,
+            (Some(one), Some(another)) => Python::attach(|py| one.same(another, py))?,
+            _ => false,
+        };
+        Ok(around && self.same(other))
+    }
+
     pub(crate) fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         self.robot.hash(&mut hasher);
@@ -306,8 +347,13 @@ impl Shape {
         let status = self.core.report.status;
         let message = &self.core.message;
         let message = if message.is_empty() { String::new() } else { format!(" ({message})") };
+        let contacts = match (&self.around, self.core.state.contacts.len()) {
+            (None, _) => String::new(),
+            (_, 1) => ", 1 contact".to_owned(),
+            (_, count) => format!(", {count} contacts"),
+        };
         format!(
-            "<Shape {status}{message}: tip ({:.6}, {:.6}, {:.6}) m, model {:?}>",
+            "<Shape {status}{message}: tip ({:.6}, {:.6}, {:.6}) m{contacts}, model {:?}>",
             tip.x,
             tip.y,
             tip.z,
@@ -331,6 +377,7 @@ impl Shape {
             self.tensions(py)?,
             self.energy(),
             (self.core.report.status.as_str(), self.message(), self.residual(), self.iterations()),
+            (self.obstacles(py), self.loads(), self.contacts(py)?),
         );
         Ok((rebuild, state.into_pyobject(py)?))
     }
@@ -367,6 +414,7 @@ pub(crate) fn _shape(
     tensions: &Bound<'_, PyAny>,
     energy: f64,
     outcome: (String, String, f64, usize),
+    around: (Bound<'_, PyAny>, Option<Bound<'_, PyAny>>, Vec<Bound<'_, Contact>>),
 ) -> PyResult<Shape> {
     let list = |name: &str, value: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
         Ok(values(&float_array(name, value)?)?.to_vec())
@@ -387,8 +435,10 @@ pub(crate) fn _shape(
         shape => return Err(crate::convert::wrong_shape("strains", "shape (n, 3 or 4)", shape)),
     };
     let rows = values(&strains)?.chunks_exact(width);
+    let (obstacles, loads, contacts) = around;
+    let around = Surroundings::new(robot.py(), Some(&obstacles), loads.as_ref())?;
     let state = State {
-        contacts: Vec::new(),
+        contacts: contacts.iter().map(|contact| contact.get().0).collect(),
         frames,
         strains: rows.clone().map(|row| Vector3::new(row[0], row[1], row[2])).collect(),
         elongations: if width == 4 { rows.map(|row| row[3]).collect() } else { Vec::new() },
@@ -401,5 +451,6 @@ pub(crate) fn _shape(
     let status = known.unwrap_or(Status::NumericalError);
     let core = tdcr::Shape { state, report: Report { status, residual, iterations }, message };
     let choice = Choice::new(model, Some(settings))?;
-    Ok(Shape::new(robot.get().clone(), choice, list("displacements", displacements)?, core))
+    let displacements = list("displacements", displacements)?;
+    Ok(Shape::new(robot.get().clone(), choice, displacements, core).among(around))
 }

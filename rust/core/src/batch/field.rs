@@ -23,11 +23,13 @@ pub enum Field {
     Tensions,
     /// Strain energy.
     Energy,
+    /// Places where rows touch obstacles: no column, but a table of its own.
+    Contacts,
 }
 
 impl Field {
     /// Every field.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Tip,
         Self::Frames,
         Self::Positions,
@@ -36,6 +38,7 @@ impl Field {
         Self::TendonLengths,
         Self::Tensions,
         Self::Energy,
+        Self::Contacts,
     ];
 
     /// Its name in Python.
@@ -50,6 +53,7 @@ impl Field {
             Self::TendonLengths => "tendon_lengths",
             Self::Tensions => "tensions",
             Self::Energy => "energy",
+            Self::Contacts => "contacts",
         }
     }
 
@@ -101,6 +105,7 @@ impl Key {
                 Field::TendonLengths => vec![Self::TendonLengths],
                 Field::Tensions => vec![Self::Tensions],
                 Field::Energy => vec![Self::Energy],
+                Field::Contacts => vec![],
             })
             .collect()
     }

@@ -11,7 +11,7 @@ use super::field::{Field, Key};
 use crate::error::InvalidInput;
 use crate::model::{Model, Report, State};
 use crate::robot::Robot;
-use crate::shape::Shape;
+use crate::shape::{Contact, Shape};
 use crate::status::Status;
 
 /// Stop flag and progress of a long call, shared with the thread that waits for it.
@@ -58,6 +58,8 @@ pub struct Solved {
     pub columns: Vec<Column>,
     /// How each row ended.
     pub reports: Vec<Report>,
+    /// Where rows touch obstacles, each with its row, in order; empty if it was not wanted.
+    pub contacts: Vec<(usize, Contact)>,
 }
 
 impl Solved {
@@ -173,23 +175,22 @@ fn solve_all<M: Model>(
     }
     let blank = Report { status: Status::NumericalError, residual: f64::NAN, iterations: 0 };
     reports.resize(rows, blank);
+    let touching = fields.contains(&Field::Contacts);
     let keys = Key::of(fields, robot);
     let columns = keys.into_iter().map(|key| Column::new(model, key, rows));
     let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
     let jobs = jobs(&mut columns, &mut reports, start);
-    let failed = pool.install(|| {
+    let done: Vec<_> = pool.install(|| {
         jobs.into_par_iter()
             .map_init(M::Workspace::default, |work, job| {
-                run(model, displacements, work, job, control, start)
+                run(model, displacements, work, job, control, start, touching)
             })
-            .filter_map(Result::err)
-            .min_by_key(|(row, _)| *row)
+            .collect()
     });
-    if let Some((_, error)) = failed {
-        return Err(error);
-    }
+    // Jobs are in order: the first that failed has the first row that did.
+    let contacts = done.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
     let stopped = control.stop.load(Ordering::Relaxed);
-    Ok((!stopped).then_some(Solved { columns, reports }))
+    Ok((!stopped).then_some(Solved { columns, reports, contacts }))
 }
 
 fn jobs<'a>(columns: &'a mut [Column], reports: &'a mut [Report], start: Start) -> Vec<Job<'a>> {
@@ -221,25 +222,29 @@ fn run<M: Model>(
     mut job: Job<'_>,
     control: &Control,
     start: Start,
-) -> Result<(), (usize, InvalidInput)> {
+    touching: bool,
+) -> Result<Vec<(usize, Contact)>, InvalidInput> {
+    let mut contacts = Vec::new();
     let rows = job.reports.len();
     let mut before = None;
     for (i, report) in job.reports.iter_mut().enumerate() {
         if control.stop.load(Ordering::Relaxed) {
-            return Ok(());
+            break;
         }
         let row = job.first + i;
-        *report =
-            solve_row(model, displacements, row, before, work).map_err(|error| (row, error))?;
+        *report = solve_row(model, displacements, row, before, work)?;
         before = (start == Start::Warm).then_some(report.status);
         for (key, column) in &mut job.columns {
             let width = column.len() / rows;
             let place = &mut column[i * width..(i + 1) * width];
             write_row(*key, place, model.robot(), model.state(work));
         }
+        if touching {
+            contacts.extend(model.state(work).contacts.iter().map(|contact| (row, *contact)));
+        }
         control.done.fetch_add(1, Ordering::Relaxed);
     }
-    Ok(())
+    Ok(contacts)
 }
 
 /// Solves a row; from the answer of the row before if that is in `work` and of use. `before` is how that

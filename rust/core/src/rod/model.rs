@@ -173,30 +173,16 @@ impl<'r> Rod<'r> {
     /// elements; a start that does not help is dropped.
     ///
     /// # Errors
-    /// `InvalidInput` for a start with another number of strains or tensions.
+    /// `InvalidInput` for a start with another number of strains.
     pub fn solve_from(
         &self,
         start: &State,
         displacements: &[f64],
         work: &mut Workspace,
     ) -> Result<Report, InvalidInput> {
-        let elements = self.plan.data.len() * self.plan.settings.elements;
-        if start.strains.len() != elements {
-            let expected = format!("{elements} strains, one per element");
-            return Err(InvalidInput::new("start", expected, start.strains.len()));
-        }
-        let width = self.plan.unknowns();
         work.chain.rest(self.plan);
-        let places = work.chain.strains.chunks_exact_mut(width);
-        for (e, (own, strain)) in places.zip(&start.strains).enumerate() {
-            own[..3].copy_from_slice(strain.as_slice());
-            if let (4, Some(elongation)) = (width, start.elongations.get(e)) {
-                own[3] = *elongation;
-            }
-        }
-        for (own, tension) in work.chain.tensions.iter_mut().zip(&start.tensions) {
-            *own = if tension.is_finite() { tension.max(0.0) / self.plan.unit } else { 0.0 };
-        }
+        let Chain { strains, tensions, .. } = &mut work.chain;
+        read_state(start, self.plan, strains, tensions)?;
         work.ending = Ending::Converged;
         self.resume(displacements, work)
     }
@@ -238,6 +224,31 @@ impl<'r> Rod<'r> {
         write_state(state, self, &chain.strains, &chain.ends, &chain.tensions);
         told(work.ending, work.left.worst(), evaluations)
     }
+}
+
+/// Puts the strains and tensions of a state, in the plan's unit, in place of those at rest.
+pub(super) fn read_state(
+    start: &State,
+    plan: &Plan,
+    strains: &mut [f64],
+    tensions: &mut [f64],
+) -> Result<(), InvalidInput> {
+    let elements = plan.data.len() * plan.settings.elements;
+    if start.strains.len() != elements {
+        let expected = format!("{elements} strains, one per element");
+        return Err(InvalidInput::new("start", expected, start.strains.len()));
+    }
+    let width = plan.unknowns();
+    for (e, (own, strain)) in strains.chunks_exact_mut(width).zip(&start.strains).enumerate() {
+        own[..3].copy_from_slice(strain.as_slice());
+        if let (4, Some(elongation)) = (width, start.elongations.get(e)) {
+            own[3] = *elongation;
+        }
+    }
+    for (own, tension) in tensions.iter_mut().zip(&start.tensions) {
+        *own = if tension.is_finite() { tension.max(0.0) / plan.unit } else { 0.0 };
+    }
+    Ok(())
 }
 
 /// Disk frames and everything else that follows from strains, the frames of the subsegments' ends in their base

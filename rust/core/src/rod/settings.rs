@@ -65,6 +65,9 @@ pub struct RodSettings {
     pub tolerance: f64,
     /// Evaluations of the whole rod at most, each of which ends in a Newton step.
     pub max_iterations: usize,
+    /// Radius of a body around the backbone that keeps clear of obstacles, for a
+    /// [`Scene`](super::contact::Scene) \[m\]; 0 for none.
+    pub body_radius: f64,
 }
 
 impl Default for RodSettings {
@@ -76,6 +79,7 @@ impl Default for RodSettings {
             elements: 1,
             tolerance: 1e-11,
             max_iterations: 600,
+            body_radius: 0.0,
         }
     }
 }
@@ -102,6 +106,10 @@ impl RodSettings {
         if self.max_iterations == 0 || self.max_iterations > 1_000_000 {
             let expected = "a whole number from 1 to 1000000";
             return Err(InvalidInput::new("max_iterations", expected, self.max_iterations));
+        }
+        if !(self.body_radius.is_finite() && self.body_radius >= 0.0) {
+            let got = format!("{:?}", self.body_radius);
+            return Err(InvalidInput::new("body_radius", "0 m or more", got));
         }
         Ok(())
     }

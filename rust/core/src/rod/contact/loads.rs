@@ -36,18 +36,11 @@ impl Default for Loads {
 }
 
 impl Loads {
-    /// Force on each disk's centre, and the moment on the tip. The weight of a subsegment goes to its two
-    /// disks in halves.
+    /// Checks the values.
     ///
     /// # Errors
-    /// `InvalidInput` for numbers that are not finite, negative masses, another number of disk forces than
-    /// disks, or a backbone without Young's modulus, in whose units no newton can be told.
-    pub fn forces(&self, robot: &Robot) -> Result<(Vec<Vector3<f64>>, Vector3<f64>), InvalidInput> {
-        let backbone = robot.backbone();
-        if !backbone.has_stiffness() {
-            let expected = "Young's modulus and diameter of the backbone (loads are in newtons)";
-            return Err(InvalidInput::new("youngs_modulus", expected, "none"));
-        }
+    /// `InvalidInput` for numbers that are not finite and negative masses.
+    pub fn validate(&self) -> Result<(), InvalidInput> {
         let vectors = [
             ("gravity", self.gravity),
             ("tip_force", self.tip_force),
@@ -66,6 +59,22 @@ impl Loads {
                 return Err(InvalidInput::new(name, "0 or more", format!("{value:?}")));
             }
         }
+        Ok(())
+    }
+
+    /// Force on each disk's centre, and the moment on the tip. The weight of a subsegment goes to its two
+    /// disks in halves.
+    ///
+    /// # Errors
+    /// As [`Self::validate`], and for another number of disk forces than disks or a backbone without Young's
+    /// modulus, in whose units no newton can be told.
+    pub fn forces(&self, robot: &Robot) -> Result<(Vec<Vector3<f64>>, Vector3<f64>), InvalidInput> {
+        let backbone = robot.backbone();
+        if !backbone.has_stiffness() {
+            let expected = "Young's modulus and diameter of the backbone (loads are in newtons)";
+            return Err(InvalidInput::new("youngs_modulus", expected, "none"));
+        }
+        self.validate()?;
         let n = backbone.subsegments();
         if !(self.disk_forces.is_empty() || self.disk_forces.len() == n + 1) {
             let expected = format!("{} forces, one per disk", n + 1);

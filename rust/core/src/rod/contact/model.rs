@@ -10,7 +10,7 @@ use crate::obstacle::Fault;
 use crate::robot::Robot;
 use crate::rod::ascent::Ending;
 use crate::rod::chain::Chain;
-use crate::rod::model::{Rod, told, write_state};
+use crate::rod::model::{Rod, read_state, told, write_state};
 use crate::rod::plan::Plan;
 use crate::rod::settings::TendonRule;
 use crate::shape::Contact;
@@ -84,6 +84,29 @@ impl<'r> LoadedRod<'r> {
 
     fn plan(&self) -> &'r Plan {
         self.rod.plan
+    }
+
+    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
+    /// elements, under the whole loads from the first step on; a start that does not help is dropped.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a start with another number of strains.
+    pub fn solve_from(
+        &self,
+        start: &State,
+        displacements: &[f64],
+        work: &mut Workspace,
+    ) -> Result<Report, InvalidInput> {
+        let plan = self.plan();
+        self.begin(displacements, work);
+        let Descent { here, estimates, .. } = &mut work.descent;
+        read_state(start, plan, &mut here.strains, &mut estimates.tensions)?;
+        let own = estimates.tensions.iter().zip(&plan.compliance);
+        let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, give))| l - t * give);
+        work.kept.bounds.clear();
+        work.kept.bounds.extend(from);
+        work.ending = Ending::Converged;
+        self.resume(displacements, work)
     }
 
     /// Puts the rest shape without multipliers, and compliances that are small against the rod's.

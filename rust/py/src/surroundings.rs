@@ -1,0 +1,227 @@
+//! Obstacles and loads that a rod is solved among, and their Python functions' exceptions on the way back.
+
+use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+
+use tdcr::InvalidInput;
+use tdcr::model::{Model, Report, State};
+use tdcr::obstacle::{Fault, Obstacle, SignedDistance, Volume};
+use tdcr::robot::Robot;
+use tdcr::rod::contact::{LoadedRod, Scene, Workspace};
+use tdcr::rod::{Plan, RodSettings};
+
+use crate::arguments::wrong_type;
+use crate::convert::invalid;
+use crate::loads::Loads;
+use crate::obstacle::{obstacles, raised};
+
+/// Obstacles, as Python knows them and as the core does, and loads.
+pub(crate) struct Surroundings {
+    pub(crate) given: Py<PyTuple>,
+    obstacles: Vec<Obstacle>,
+    pub(crate) loads: Option<Loads>,
+    stop: Stop,
+}
+
+/// The flag that ends a batch, once there is one.
+type Stop = Arc<OnceLock<Arc<AtomicBool>>>;
+
+impl Surroundings {
+    /// From the arguments; nothing at all is an empty place.
+    pub(crate) fn new(
+        py: Python<'_>,
+        given: Option<&Bound<'_, PyAny>>,
+        loads: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let loads = loads.map(|value| match value.cast::<Loads>() {
+            Ok(loads) => Ok(loads.get().clone()),
+            Err(_) => Err(wrong_type("loads", "Loads", value)),
+        });
+        let (loads, stop) = (loads.transpose()?, Stop::default());
+        let Some(given) = given else {
+            return Ok(Self { given: PyTuple::empty(py).unbind(), obstacles: vec![], loads, stop });
+        };
+        let given = if given.is_instance_of::<crate::obstacle::Obstacle>() {
+            PyTuple::new(py, [given])?
+        } else {
+            let expected = "an obstacle or a sequence of obstacles";
+            let items = given.try_iter().map_err(|_| wrong_type("obstacles", expected, given))?;
+            PyTuple::new(py, items.collect::<PyResult<Vec<_>>>()?)?
+        };
+        let all = obstacles("obstacles", &given)?;
+        let one = all.len() == 1;
+        let all = all.into_iter().enumerate();
+        let all = all.map(|(i, obstacle)| listening(obstacle, (!one).then_some(i), &stop));
+        Ok(Self { given: given.unbind(), obstacles: all.collect(), loads, stop })
+    }
+
+    /// Functions fail from when the flag is set, in the midst of a solve.
+    pub(crate) fn stopped_by(&self, stop: &Arc<AtomicBool>) {
+        self.stop.get_or_init(|| Arc::clone(stop));
+    }
+
+    /// What there is, for those who do not take it: the name of the argument.
+    pub(crate) fn any(&self) -> Option<&'static str> {
+        if !self.obstacles.is_empty() {
+            return Some("obstacles");
+        }
+        self.loads.as_ref().map(|_| "loads")
+    }
+
+    /// The robot's scene.
+    pub(crate) fn scene(
+        &self,
+        robot: &Robot,
+        plan: &Plan,
+        settings: &RodSettings,
+    ) -> Result<Scene, InvalidInput> {
+        let loads = self.loads.as_ref().map(|loads| &loads.0);
+        Scene::new(robot, plan, &self.obstacles, loads, settings.body_radius)
+    }
+
+    pub(crate) fn same(&self, other: &Self, py: Python<'_>) -> PyResult<bool> {
+        Ok(self.loads == other.loads && self.given.bind(py).eq(other.given.bind(py))?)
+    }
+}
+
+/// A fault of one of several obstacles.
+#[derive(Debug)]
+struct Named {
+    obstacle: usize,
+    fault: Fault,
+}
+
+impl fmt::Display for Named {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "obstacles[{}]: {}", self.obstacle, self.fault)
+    }
+}
+
+impl std::error::Error for Named {}
+
+/// A function that says whose its faults are, where there are several obstacles, and that listens to a flag.
+/// Other volumes have no faults and are quick.
+fn listening(obstacle: Obstacle, index: Option<usize>, stop: &Stop) -> Obstacle {
+    let Volume::SignedDistance(function) = obstacle.volume() else { return obstacle };
+    let solid = Obstacle::new(function.clone(), false);
+    let stop = Arc::clone(stop);
+    let function = SignedDistance::new(Arc::new(move |x| {
+        if stop.get().is_some_and(|stop| stop.load(Ordering::SeqCst)) {
+            return Err("stopped".into());
+        }
+        let near = solid.nearest(x).map_err(|fault| match index {
+            Some(obstacle) => Box::new(Named { obstacle, fault }),
+            None => fault,
+        })?;
+        Ok((near.distance, near.gradient))
+    }));
+    Obstacle::new(function, obstacle.inside())
+}
+
+/// A rod among obstacles whose first fault ends all work.
+pub(crate) struct Watched<'r> {
+    rod: LoadedRod<'r>,
+    stop: Arc<AtomicBool>,
+    fault: &'r Mutex<Option<Fault>>,
+}
+
+impl<'r> Watched<'r> {
+    pub(crate) fn new(
+        rod: LoadedRod<'r>,
+        stop: Arc<AtomicBool>,
+        fault: &'r Mutex<Option<Fault>>,
+    ) -> Self {
+        Self { rod, stop, fault }
+    }
+
+    /// Solves from the state of an earlier shape.
+    pub(crate) fn shape_from(
+        &self,
+        start: &State,
+        displacements: &[f64],
+    ) -> Result<tdcr::Shape, InvalidInput> {
+        self.rod.robot().check_displacements(displacements)?;
+        let mut work = Workspace::default();
+        let report = self.rod.solve_from(start, displacements, &mut work)?;
+        self.watch(&mut work);
+        Ok(self.rod.result(displacements, report, work))
+    }
+
+    fn watch(&self, work: &mut Workspace) {
+        if let Some(fault) = work.take_fault() {
+            self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(fault);
+            // After that: what others fail with because of it comes too late.
+            self.stop.store(true, Ordering::SeqCst);
+        }
+    }
+}
+
+impl Model for Watched<'_> {
+    type Workspace = Workspace;
+
+    fn robot(&self) -> &Robot {
+        self.rod.robot()
+    }
+
+    fn strain_width(&self) -> usize {
+        self.rod.strain_width()
+    }
+
+    fn elements(&self) -> usize {
+        self.rod.elements()
+    }
+
+    fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+        let report = self.rod.solve(displacements, work)?;
+        self.watch(work);
+        Ok(report)
+    }
+
+    fn resume(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+        let report = self.rod.resume(displacements, work)?;
+        self.watch(work);
+        Ok(report)
+    }
+
+    fn state<'w>(&self, work: &'w Workspace) -> &'w State {
+        self.rod.state(work)
+    }
+
+    fn take_state(&self, work: Workspace) -> State {
+        self.rod.take_state(work)
+    }
+
+    fn message(&self, displacements: &[f64], work: &Workspace) -> String {
+        self.rod.message(displacements, work)
+    }
+}
+
+/// Raises the fault that work ended with, if it did.
+pub(crate) fn checked(py: Python<'_>, fault: Mutex<Option<Fault>>) -> PyResult<()> {
+    let Some(fault) = fault.into_inner().unwrap_or_else(PoisonError::into_inner) else {
+        return Ok(());
+    };
+    Err(match fault.downcast::<Named>() {
+        Ok(named) => raised(py, named.fault, Some(&format!("obstacles[{}]", named.obstacle))),
+        Err(fault) => raised(py, fault, None),
+    })
+}
+
+/// Solves once without the GIL, which Python functions of obstacles take; these see Ctrl-C too.
+pub(crate) fn solve(
+    py: Python<'_>,
+    robot: &Robot,
+    plan: &Plan,
+    scene: &Scene,
+    job: impl FnOnce(&Watched<'_>) -> Result<tdcr::Shape, InvalidInput> + Send,
+) -> PyResult<tdcr::Shape> {
+    let fault = Mutex::new(None);
+    let rod = LoadedRod::new(robot, plan, scene).map_err(|e| invalid(&e))?;
+    let shape = py.detach(|| job(&Watched::new(rod, Arc::default(), &fault)));
+    checked(py, fault)?;
+    shape.map_err(|e| invalid(&e))
+}

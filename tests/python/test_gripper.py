@@ -1,0 +1,274 @@
+"""Grippers: placement, closing, forces on the object, force closure, pictures."""
+
+import copy
+import importlib.util
+import itertools
+import pickle
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tdcr
+from tdcr._force_closure import positively_span, wrenches
+
+ROOT = Path(__file__).resolve().parents[2]
+BALL = tdcr.Sphere((0, 0, 0.14), 0.04)
+
+
+def finger(**keywords):
+    return tdcr.Robot(tdcr.Backbone(0.18, 9), [tdcr.Tendon(0.0, 0.008)], **keywords)
+
+
+@pytest.fixture(scope="module")
+def grasp():
+    return tdcr.Gripper.around(finger(), 3, 0.06).close([-0.003], BALL, steps=8)
+
+
+# --- placement ---------------------------------------------------------------------------------
+
+
+def test_fingers_stand_around_the_axis_and_bend_towards_it():
+    gripper = tdcr.Gripper.around(finger(name="f"), 5, 0.06, azimuth=0.3)
+    assert [robot.name for robot in gripper.fingers] == [f"f {k}" for k in range(5)]
+    for k, robot in enumerate(gripper.fingers):
+        angle = 0.3 + 2 * np.pi * k / 5
+        out = np.array([np.cos(angle), np.sin(angle), 0])
+        assert robot.base[:3, 3] == pytest.approx(0.06 * out)
+        assert robot.base[:3, 0] == pytest.approx(-out)
+        tip = tdcr.forward(robot, [-0.004]).tip[:3, 3]
+        assert np.hypot(*tip[:2]) < 0.06
+
+
+@pytest.mark.parametrize("axis", [(0, 0, -2), (1, 0, 0), (1, -2, 3)])
+def test_the_axis_may_be_any(axis):
+    base = np.eye(4)
+    base[2, 3] = 0.01
+    gripper = tdcr.Gripper.around(finger(base=base), 3, 0.05, axis=axis, center=(1, 2, 3))
+    unit = np.array(axis) / np.linalg.norm(axis)
+    for robot in gripper.fingers:
+        assert robot.base[:3, 2] == pytest.approx(unit)
+        offset = robot.base[:3, 3] - [1, 2, 3]
+        assert offset @ unit == pytest.approx(0.01)
+        assert np.linalg.norm(offset - 0.01 * unit) == pytest.approx(0.05)
+        assert robot.base[:3, 0] @ (offset - 0.01 * unit) == pytest.approx(-0.05)
+
+
+def test_a_gripper_is_a_value():
+    gripper = tdcr.Gripper.around(finger(), 3, 0.06)
+    assert gripper == tdcr.Gripper(gripper.fingers)
+    assert pickle.loads(pickle.dumps(gripper)) == gripper
+    assert hash(copy.deepcopy(gripper)) == hash(gripper)
+    assert gripper != tdcr.Gripper(gripper.fingers[:2])
+
+
+def test_bad_grippers():
+    with pytest.raises(tdcr.InvalidInput, match="fingers: expected one robot or more, got none"):
+        tdcr.Gripper([])
+    with pytest.raises(tdcr.InvalidInput, match=r"fingers\[1\]: expected a base of its own"):
+        tdcr.Gripper([finger(), finger()])
+    with pytest.raises(TypeError, match=r"fingers\[0\]: expected a Robot, got str"):
+        tdcr.Gripper(["thumb"])
+    for keywords, argument in (
+        ({"count": 0}, "count"),
+        ({"distance": 0.0}, "distance"),
+        ({"distance": np.nan}, "distance"),
+        ({"axis": (0, 0, 0)}, "axis"),
+        ({"axis": (0, 1)}, "axis"),
+    ):
+        with pytest.raises(tdcr.InvalidInput, match=f"{argument}: expected"):
+            tdcr.Gripper.around(finger(), **{"count": 3, "distance": 0.06, **keywords})
+
+
+# --- closing -----------------------------------------------------------------------------------
+
+
+def test_a_closing_is_its_forward_solves(grasp):
+    assert grasp.ok
+    assert grasp.shares.tolist() == np.linspace(0, 1, 9).tolist()
+    assert len(grasp.shapes) == 9
+    for k, robot in enumerate(tdcr.Gripper.around(finger(), 3, 0.06).fingers):
+        for share, row in zip(grasp.shares, grasp.shapes, strict=True):
+            own = tdcr.forward(robot, [-0.003 * share], obstacles=BALL).require()
+            assert row[k].robot == robot
+            assert row[k].positions == pytest.approx(own.positions, abs=1e-8)
+    first = grasp.touch[0]
+    assert grasp.touch == (first,) * 3
+    step = grasp.shares.tolist().index(first)
+    assert 0 < step < 8
+    assert grasp.contacts(step)
+    assert not grasp.contacts(step - 1)
+
+
+def test_forces_on_the_object_are_those_on_the_fingers_turned(grasp):
+    # By symmetry only the axis is left, and no moment about the centre.
+    total = -sum(contact.force for _, contact in grasp.contacts())
+    assert grasp.force() == pytest.approx(total)
+    assert grasp.force()[:2] == pytest.approx([0, 0], abs=1e-6)
+    assert abs(grasp.force()[2]) > 0.1
+    assert grasp.moment() == pytest.approx(np.zeros(3), abs=1e-6)
+    assert grasp.center().tolist() == [0, 0, 0.14]
+    about = np.array([0.1, 0.2, 0.3])
+    shifted = np.cross(grasp.center() - about, grasp.force())
+    assert grasp.moment(about) == pytest.approx(shifted, abs=1e-6)
+    assert grasp.force(0).tolist() == grasp.moment(step=0).tolist() == [0, 0, 0]
+
+
+def test_each_finger_may_have_its_own_pull():
+    gripper = tdcr.Gripper.around(finger(), 3, 0.06)
+    floor = tdcr.HalfSpace((0, 0, -0.01), (0, 0, 1))
+    told = []
+    grasp = gripper.close([[-0.003], [0.0], [np.inf]], [BALL, floor], steps=4, progress=told.append)
+    assert told == [1, 2, 3, 4, 5]
+    assert grasp.touch[0] is not None
+    assert grasp.touch[1:] == (None, None)
+    assert {k for k, _ in grasp.contacts()} == {0}
+    assert grasp.contacts(obstacle=1) == []
+    assert np.isnan(grasp.center(obstacle=1)).all()
+    assert [shape.displacements[0] for shape in grasp.shapes[-1]] == [-0.003, 0.0, np.inf]
+    assert grasp.force()[0] < 0
+
+
+def test_a_grasp_is_a_value(grasp):
+    again = pickle.loads(pickle.dumps(grasp))
+    assert again == grasp
+    assert hash(again) == hash(grasp)
+    assert not again.shares.flags.writeable
+    assert "3 fingers in 8 steps, all converged" in repr(grasp)
+
+
+def test_bad_closings():
+    gripper = tdcr.Gripper.around(finger(), 3, 0.06)
+    with pytest.raises(tdcr.InvalidInput, match="displacements: expected one row for all or 3"):
+        gripper.close([[-0.001], [-0.001]], BALL)
+    with pytest.raises(tdcr.InvalidInput, match="steps: expected 1 or more"):
+        gripper.close([-0.001], BALL, steps=0)
+    with pytest.raises(tdcr.InvalidInput, match="displacements"):
+        gripper.close([np.nan], BALL, steps=1)
+
+
+# --- force closure -----------------------------------------------------------------------------
+
+
+def closed(points, pushes, friction=0.0, edges=8):
+    points, pushes = np.array(points, float), np.array(pushes, float)
+    return positively_span(wrenches(points, pushes, friction, edges))
+
+
+def test_seven_pushes_hold_a_cube_and_six_do_not():
+    """Three pairs of faces, each pair pushed off its middle: turned about all axes both ways."""
+    # A frictionless cube: two pushes per face suffice in every direction.
+    points, pushes = [], []
+    for axis, side in itertools.product(range(3), (-1.0, 1.0)):
+        for off in (-0.5, 0.5):
+            point = np.zeros(3)
+            point[axis], point[axis - 1] = side, off
+            points.append(point)
+            push = np.zeros(3)
+            push[axis] = -side
+            pushes.append(push)
+    assert closed(points, pushes)
+    assert not closed(points[:6], pushes[:6])
+    # All through the middle: no moment.
+    through = [np.where(np.abs(p) == 1, p, 0) for p in points]
+    assert not closed(through, pushes)
+    # Nothing from one side.
+    assert not closed(points[:-2], pushes[:-2])
+
+
+def test_a_ball_is_held_with_friction_only():
+    angle = 2 * np.pi * np.arange(3) / 3
+    points = np.array([np.cos(angle), np.sin(angle), np.zeros(3)]).T
+    assert not closed(points, -points)
+    assert closed(points, -points, friction=0.2)
+    # From above, the cones must reach beyond the horizontal: at 45 degrees from coefficient 1 on.
+    above = np.array([np.cos(angle), np.sin(angle), np.ones(3)]).T / np.sqrt(2)
+    assert not closed(above, -above, friction=0.9, edges=64)
+    assert closed(above, -above, friction=1.1, edges=64)
+    # Two points cannot turn about their line.
+    assert not closed([[1, 0, 0], [-1, 0, 0]], [[-1, 0, 0], [1, 0, 0]], friction=1.0)
+
+
+def test_random_columns_agree_with_directions():
+    """Columns span positively if and only if every direction has one ahead of it."""
+    random = np.random.default_rng(3)
+    answers = []
+    for _ in range(300):
+        columns = random.normal(size=(2, random.integers(2, 6)))
+        angles = np.sort(np.arctan2(columns[1], columns[0]))
+        gaps = np.diff([*angles, angles[0] + 2 * np.pi])
+        expected = bool(gaps.max() < np.pi)
+        assert positively_span(columns) == expected
+        answers.append(expected)
+    assert 50 < sum(answers) < 250
+
+
+def test_closure_of_a_grasp(grasp):
+    assert not grasp.force_closure(step=0)
+    assert not grasp.force_closure()
+    assert grasp.force_closure(0.5)
+    with pytest.raises(tdcr.InvalidInput, match="friction: expected 0 or more"):
+        grasp.force_closure(-0.5)
+    with pytest.raises(tdcr.InvalidInput, match="edges: expected 3 or more"):
+        grasp.force_closure(0.5, edges=2)
+
+
+# --- pictures and the paper's cases ------------------------------------------------------------
+
+
+def test_pictures(grasp, tmp_path):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    first, last = grasp.plot(0), grasp.plot()
+    assert last.get_title() == f"100% of the pull, {len(grasp.contacts())} contacts"
+    assert first.get_xlim() == last.get_xlim()
+    assert len(last.collections) > len(first.collections)
+    assert grasp.plot(ax=first, title="") is first
+    pyplot.close("all")
+    with pytest.raises(tdcr.InvalidInput, match=r"path: expected one ending in \.gif"):
+        grasp.animate(tmp_path / "closing.mp4")
+    short = tdcr.Grasp(grasp.shares[[0, -1]], (grasp.shapes[0], grasp.shapes[-1]))
+    short.animate(tmp_path / "closing.gif", fps=2)
+    pillow = pytest.importorskip("PIL.Image")
+    with pillow.open(tmp_path / "closing.gif") as picture:
+        assert picture.n_frames == 2
+
+
+@pytest.fixture(scope="module")
+def example():
+    name = "mahapatra_ghosal_grippers"
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"examples/{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules[name]
+
+
+def test_the_papers_fingers_lie_on_the_ball_after_their_pull(example):
+    gripper, ball = example.sphere_gripper()
+    for robot in gripper.fingers:
+        assert tdcr.clearance(ball, robot.rest_frames[:, :3, 3]).min() > example.HOLE
+        # Without the ball the far part of the backbone runs 8 mm before it, to a millimetre.
+        shape = tdcr.forward(robot, [-example.PULL]).require()
+        distance = tdcr.clearance(ball, shape.positions)
+        assert np.abs(distance[5:] - example.HOLE).max() < 1e-3
+    grasp = gripper.close([-example.PULL * 10 / 9], ball, steps=10)
+    assert grasp.ok
+    assert len({share for share in grasp.touch}) == 1
+    assert grasp.force()[2] < 0
+    # All at one height, where the ball slips down out of cones that do not reach the horizontal.
+    assert not grasp.force_closure(0.5)
+    assert grasp.force_closure(2.0)
+
+
+def test_the_second_tendon_turns_the_cube(example):
+    _, moments, grasps = example.turn_cube(steps=10)
+    assert all(grasp.ok for grasp in grasps)
+    about_z = np.array(moments)[:, 2]
+    assert about_z[0] == pytest.approx(0.0, abs=1e-8)
+    assert (np.diff(about_z) < 0).all()
+    assert about_z[-1] < -0.01
