@@ -12,6 +12,7 @@ mod backbone;
 mod bounds;
 mod constant_curvature;
 mod convert;
+mod design;
 mod forward;
 mod inverse;
 mod long_call;
@@ -43,6 +44,8 @@ mod _core {
     use crate::constant_curvature::{
         _arc_frames, _arc_from_displacements, _arc_jacobian, _displacements_from_arc,
     };
+    #[pymodule_export]
+    use crate::design::{_points_on_curve, _prebend, PrebendSettings};
     #[pymodule_export]
     use crate::forward::{_fields, _forward_batch, forward};
     #[pymodule_export]
