@@ -2,6 +2,8 @@
 
 import copy
 import pickle
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -207,3 +209,18 @@ def test_wrong_types():
     ):
         with pytest.raises(TypeError, match=r"expected .*got "):
             design.prebend(*arguments, settings=settings)
+
+
+def test_the_example_draws_what_is_kept(tmp_path):
+    pytest.importorskip("matplotlib")
+    root = Path(__file__).resolve().parents[2]
+    script = root / "examples" / "mahapatra_ghosal_prebend.py"
+    runpy.run_path(str(script))["figures"](tmp_path)
+    for name, shapes in (("mahapatra_sphere_finger", 2), ("mahapatra_10", 6)):
+        assert (tmp_path / f"{name}.png").exists()
+        made, kept = (
+            np.genfromtxt(folder / f"{name}.csv", delimiter=",", skip_header=1)
+            for folder in (tmp_path, root / "examples/figures")
+        )
+        assert len(made) == 10 * shapes
+        assert made == pytest.approx(kept, abs=1e-5, nan_ok=True)

@@ -1,6 +1,10 @@
 //! The engines of `tdcr.design`; its docstrings are in Python, but for the settings'.
+// Python shows the default of `max_bend` as a number.
+#![allow(clippy::approx_constant)]
 
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -77,7 +81,6 @@ pub(crate) fn keywords<'py>(
 #[pymethods]
 impl PrebendSettings {
     #[new]
-    #[allow(clippy::approx_constant)] // Python shows the number.
     #[pyo3(signature = (*, rod=None, max_bend=3.141_592_653_589_793, smoothness=0.0,
                         tolerance=1e-10, max_iterations=100))]
     fn new(
@@ -146,6 +149,10 @@ impl PrebendSettings {
     }
 }
 
+/// Changes of disks by rest bends, of about a microsecond each, up to which a design ends soon enough to go
+/// without listening for Ctrl-C.
+const SOON: usize = 100_000;
+
 /// Robot, shape, errors, iterations, status and message of a design.
 #[pyfunction]
 pub(crate) fn _prebend<'py>(
@@ -158,9 +165,14 @@ pub(crate) fn _prebend<'py>(
     let targets = vectors("target_positions", targets)?;
     let pulls = one_row(robot, displacements)?;
     let (core, settings) = (&robot.get().0, settings.get().0);
-    let answer = long_call::run(py, None, |control| {
-        prebend_stopped_by(core, &targets, &pulls, &settings, &control.stop)
-    })?;
+    let solve =
+        |stop: &Arc<AtomicBool>| prebend_stopped_by(core, &targets, &pulls, &settings, stop);
+    let work = targets.len().pow(2) * settings.rod.elements;
+    let answer = if work.saturating_mul(settings.max_iterations) <= SOON {
+        py.detach(|| solve(&Arc::default()))
+    } else {
+        long_call::run(py, None, |control| solve(&control.stop))?
+    };
     let answer = answer.map_err(|e| invalid(&e))?;
     let disks = answer.errors.len();
     let robot = Robot::from(answer.robot);
