@@ -20,6 +20,7 @@ import numpy as np
 
 from tdcr import _core
 from tdcr._core import PrebendSettings, Robot
+from tdcr._fit import Fit, fit
 from tdcr._status import Status
 from tdcr._value import Value
 from tdcr.errors import InvalidInput, NotConverged
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     Array: TypeAlias = NDArray[np.float64]
     Curve: TypeAlias = Callable[[float], ArrayLike]
 
-__all__ = ["Prebend", "PrebendSettings", "on_curve", "prebend"]
+__all__ = ["Fit", "Prebend", "PrebendSettings", "fit", "on_curve", "prebend"]
 
 # A curve given as a function is sampled so often per subsegment, and so far beyond the robot's
 # length: arcs and chords need more of a curve than their own length where it bends.
