@@ -15,7 +15,7 @@ tendon's length inside the robot: negative pulls.
 
 from __future__ import annotations
 
-from tdcr import constant_curvature, planar, pso
+from tdcr import constant_curvature, design, planar, pso
 from tdcr._batch import ShapeBatch, forward_batch
 from tdcr._core import (
     Backbone,
@@ -31,6 +31,7 @@ from tdcr._core import (
     Loads,
     Mesh,
     Obstacle,
+    PrebendSettings,
     PsoSettings,
     Robot,
     RodSettings,
@@ -81,6 +82,7 @@ __all__ = [
     "Mesh",
     "NotConverged",
     "Obstacle",
+    "PrebendSettings",
     "PsoSettings",
     "Robot",
     "RodSettings",
@@ -95,6 +97,7 @@ __all__ = [
     "Variation",
     "clearance",
     "constant_curvature",
+    "design",
     "forward",
     "forward_batch",
     "inverse",

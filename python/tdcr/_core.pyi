@@ -23,6 +23,7 @@ __all__ = [
     "Loads",
     "Mesh",
     "Obstacle",
+    "PrebendSettings",
     "PsoSettings",
     "Robot",
     "RodSettings",
@@ -56,6 +57,8 @@ __all__ = [
     "_planar_swarm_batch",
     "_planar_trunk",
     "_planar_turns",
+    "_points_on_curve",
+    "_prebend",
     "_pso_minimize",
     "_rotation_vector",
     "_rust_defaults",
@@ -379,6 +382,32 @@ class RodSettings:
     def max_iterations(self) -> int: ...
     @property
     def body_radius(self) -> float: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class PrebendSettings:
+    def __new__(
+        cls,
+        *,
+        rod: RodSettings | None = None,
+        max_bend: float = 3.141592653589793,
+        smoothness: float = 0.0,
+        tolerance: float = 1e-10,
+        max_iterations: int = 100,
+    ) -> Self: ...
+    @property
+    def rod(self) -> RodSettings: ...
+    @property
+    def max_bend(self) -> float: ...
+    @property
+    def smoothness(self) -> float: ...
+    @property
+    def tolerance(self) -> float: ...
+    @property
+    def max_iterations(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -772,6 +801,10 @@ def _arc_jacobian(
     base: ArrayLike | None,
     tool: ArrayLike | None,
 ) -> _Array: ...
+def _points_on_curve(robot: Robot, points: ArrayLike, subsegment: str) -> _Array: ...
+def _prebend(
+    robot: Robot, targets: ArrayLike, displacements: ArrayLike, settings: PrebendSettings
+) -> tuple[Robot, Shape, _Array, int, Status, str]: ...
 def _pso_minimize(
     f: Callable[[_Array], object],
     lower: ArrayLike,

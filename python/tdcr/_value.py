@@ -45,11 +45,15 @@ def _read_only(value: Any) -> Any:
         value.flags.writeable = False
     if isinstance(value, list):
         return [_read_only(item) for item in value]
+    if isinstance(value, dict):
+        return {name: _read_only(item) for name, item in value.items()}
     return value
 
 
 def same(mine: Any, theirs: Any) -> bool:
-    """Compare arrays by their numbers, NaN to NaN, lists item by item, anything else as it is."""
+    """Compare arrays by their numbers, NaN to NaN, lists and dicts by items, others as they are."""
+    if isinstance(mine, dict) and isinstance(theirs, dict):
+        return mine.keys() == theirs.keys() and all(same(mine[name], theirs[name]) for name in mine)
     if isinstance(mine, list) and isinstance(theirs, list):
         return len(mine) == len(theirs) and all(map(same, mine, theirs))
     if isinstance(mine, np.ndarray) and isinstance(theirs, np.ndarray):

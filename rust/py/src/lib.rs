@@ -13,6 +13,7 @@ mod bounds;
 mod constant_curvature;
 mod contact;
 mod convert;
+mod design;
 mod forward;
 mod inverse;
 mod loads;
@@ -48,6 +49,8 @@ mod _core {
     };
     #[pymodule_export]
     use crate::contact::Contact;
+    #[pymodule_export]
+    use crate::design::{_points_on_curve, _prebend, PrebendSettings};
     #[pymodule_export]
     use crate::forward::{_fields, _forward_batch, forward};
     #[pymodule_export]

@@ -56,6 +56,12 @@ struct Kept {
     rest_frames: Lazy,
 }
 
+impl From<core::Robot> for Robot {
+    fn from(robot: core::Robot) -> Self {
+        Self(Arc::new(robot), Arc::default())
+    }
+}
+
 impl Robot {
     /// The plan of the linkage model, made on first use.
     pub(crate) fn linkage_plan(&self) -> Result<&linkage::Plan, InvalidInput> {
@@ -146,7 +152,7 @@ impl Robot {
         let tendons = tendons_of(tendons)?;
         let backbone = backbone.get().0.clone();
         core::Robot::new(backbone, tendons, base.as_ref(), tool.as_ref(), name)
-            .map(|robot| Self(Arc::new(robot), Arc::default()))
+            .map(Self::from)
             .map_err(|e| invalid(&e))
     }
 

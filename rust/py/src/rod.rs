@@ -62,7 +62,7 @@ fn max_iterations(value: &Bound<'_, PyAny>) -> PyResult<usize> {
 }
 
 /// The choice of a name.
-fn named<T: Copy>(
+pub(crate) fn named<T: Copy>(
     argument: &str,
     all: [T; 2],
     name: fn(T) -> &'static str,

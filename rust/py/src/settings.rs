@@ -5,6 +5,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use tdcr::InvalidInput;
 use tdcr::constant_curvature as cc;
+use tdcr::design::PrebendSettings;
 use tdcr::inverse;
 use tdcr::linkage;
 use tdcr::rod::RodSettings;
@@ -12,6 +13,7 @@ use tdcr::solve::pso::PsoSettings;
 
 use crate::arguments::{OneOrMany, number, whole};
 use crate::convert::{invalid, one_or_tuple};
+use crate::design;
 use crate::pso_settings::{self, PsoSettings as PyPsoSettings};
 use crate::rod;
 
@@ -370,6 +372,7 @@ pub(crate) fn _rust_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let inverse = InverseSettings(inverse::InverseSettings::default());
     defaults.set_item("InverseSettings", inverse.__getnewargs_ex__(py)?.1)?;
     defaults.set_item("RodSettings", rod::keywords(py, &RodSettings::default())?)?;
+    defaults.set_item("PrebendSettings", design::keywords(py, &PrebendSettings::default())?)?;
     defaults.set_item("PsoSettings", pso_settings::keywords(py, &PsoSettings::default())?)?;
     Ok(defaults)
 }

@@ -10,6 +10,29 @@ use crate::rod::Subsegment;
 /// Bisections of one subsegment's end on the curve.
 const HALVINGS: usize = 60;
 
+/// Length of the link over a chord, or of the arc over it that starts along a tangent.
+pub(super) fn piece_length(kind: Subsegment, tangent: &Vector3<f64>, chord: &Vector3<f64>) -> f64 {
+    let size = chord.norm();
+    match kind {
+        Subsegment::Link => size,
+        Subsegment::Arc => {
+            let half = tangent.cross(chord).norm().atan2(tangent.dot(chord));
+            let ratio = if half > 1e-8 { half / half.sin() } else { 1.0 };
+            size * ratio
+        }
+    }
+}
+
+/// The tangent at an arc's end: the one at its start, mirrored at the chord.
+pub(super) fn mirrored(tangent: &Vector3<f64>, chord: &Vector3<f64>) -> Vector3<f64> {
+    let axis = tangent.cross(chord);
+    let half = axis.norm().atan2(tangent.dot(chord));
+    if axis.norm() > 0.0 {
+        return so3::exp(&(axis.normalize() * (2.0 * half))) * tangent;
+    }
+    *tangent
+}
+
 /// Wanted places of disks 1 to n on the spline through `points` \[m\], where they can be reached one after the
 /// other from the base frame: at equal chords for links; for arcs, whose tangents go over into each other, at the
 /// ends of arcs that start along the last one's end. The curve is moved to start at the base.
@@ -30,23 +53,13 @@ pub fn points_on_curve(
     let mut out = Vec::with_capacity(robot.backbone().subsegments());
     for (i, length) in robot.backbone().lengths().iter().enumerate() {
         // Length of the piece that would end at an arc length of the curve.
-        let needed = |s: f64| {
-            let chord = spline.at_arc_length(s).0 + shift - place;
-            let size = chord.norm();
-            match kind {
-                Subsegment::Link => size,
-                Subsegment::Arc => {
-                    let half = tangent.cross(&chord).norm().atan2(tangent.dot(&chord));
-                    let ratio = if half > 1e-8 { half / half.sin() } else { 1.0 };
-                    size * ratio
-                }
-            }
-        };
+        let needed =
+            |s: f64| piece_length(kind, &tangent, &(spline.at_arc_length(s).0 + shift - place));
         let (mut low, mut high) = (at, (at + 2.0 * length).min(spline.length()));
         if needed(high) < *length * (1.0 - 1e-12) {
             let expected = format!("a curve that reaches disk {}", i + 1);
             let got = format!("one of {:.6} m", spline.length());
-            return Err(InvalidInput::new("target_positions", expected, got));
+            return Err(InvalidInput::new("points", expected, got));
         }
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
@@ -54,12 +67,8 @@ pub fn points_on_curve(
         }
         at = 0.5 * (low + high);
         let next = spline.at_arc_length(at).0 + shift;
-        let chord = next - place;
-        // The tangent at an arc's end is the one at its start, mirrored at the chord.
-        let axis = tangent.cross(&chord);
-        let half = axis.norm().atan2(tangent.dot(&chord));
-        if axis.norm() > 0.0 && kind == Subsegment::Arc {
-            tangent = so3::exp(&(axis.normalize() * (2.0 * half))) * tangent;
+        if kind == Subsegment::Arc {
+            tangent = mirrored(&tangent, &(next - place));
         }
         place = next;
         out.push(next);

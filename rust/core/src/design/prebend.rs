@@ -1,8 +1,12 @@
 //! Pre-bent design: the rest shape that takes a wanted shape when the tendons are pulled (Mahapatra & Ghosal
 //! 2024, section 4).
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::hindrance::hindrance;
 use super::march::march;
 use crate::error::InvalidInput;
 use crate::model::Model;
@@ -104,6 +108,20 @@ pub fn prebend(
     displacements: &[f64],
     settings: &PrebendSettings,
 ) -> Result<Prebend, InvalidInput> {
+    prebend_stopped_by(robot, targets, displacements, settings, &Arc::default())
+}
+
+/// The same, which ends soon after the flag is set, with the status of an iteration limit.
+///
+/// # Errors
+/// As [`prebend`].
+pub fn prebend_stopped_by(
+    robot: &Robot,
+    targets: &[Vector3<f64>],
+    displacements: &[f64],
+    settings: &PrebendSettings,
+    stop: &Arc<AtomicBool>,
+) -> Result<Prebend, InvalidInput> {
     settings.validate()?;
     robot.check_displacements(displacements)?;
     let n = robot.backbone().subsegments();
@@ -115,7 +133,7 @@ pub fn prebend(
         let got = format!("{:?} at disk {}", targets[i].as_slice(), i + 1);
         return Err(InvalidInput::new("target_positions", "finite places [m]", got));
     }
-    let design = Design { robot, targets, displacements, settings };
+    let design = Design { robot, targets, displacements, settings, stop };
     let start = match design.marched()? {
         Some(candidate) if design.met(&candidate) && settings.smoothness == 0.0 => {
             return design.told(&candidate);
@@ -132,6 +150,7 @@ struct Design<'a> {
     targets: &'a [Vector3<f64>],
     displacements: &'a [f64],
     settings: &'a PrebendSettings,
+    stop: &'a Arc<AtomicBool>,
 }
 
 /// A rest shape and what became of it.
@@ -164,7 +183,7 @@ impl Design<'_> {
     ) -> Result<Candidate, InvalidInput> {
         let robot = self.with_rest(&rest)?;
         let plan = Plan::new(&robot, self.settings.rod)?;
-        let rod = Rod::new(&robot, &plan);
+        let rod = Rod::new(&robot, &plan).stopped_by(Arc::clone(self.stop));
         let mut work = Workspace::default();
         let report = match near {
             Some(shape) => rod.solve_from(&shape.state, self.displacements, &mut work)?,
@@ -265,7 +284,8 @@ impl Design<'_> {
         let mut damping = 1e-6;
         let mut residual = self.residual(&best);
         while best.iterations < self.settings.max_iterations {
-            if best.shape.report.status != Status::Converged
+            if self.stop.load(Ordering::Relaxed)
+                || best.shape.report.status != Status::Converged
                 || (self.met(&best) && self.settings.smoothness == 0.0)
             {
                 break;
@@ -275,7 +295,7 @@ impl Design<'_> {
             let gram = jacobian.tr_mul(&jacobian);
             let value = residual.norm_squared();
             let mut lower = None;
-            while damping < 1e9 {
+            while damping < 1e9 && !self.stop.load(Ordering::Relaxed) {
                 let mut damped = gram.clone();
                 for k in 0..damped.nrows() {
                     damped[(k, k)] += damping * (1e-12 + value);
@@ -320,7 +340,8 @@ impl Design<'_> {
             (Status::Converged, String::new())
         } else {
             let disk = errors.iter().position(|e| *e == worst).unwrap_or(0);
-            let text = format!("disk {disk} stays {worst:.3e} m from its place");
+            let why = hindrance(self.robot, self.targets, self.settings.rod.subsegment);
+            let text = format!("disk {disk} stays {worst:.3e} m from its place{why}");
             (Status::Unreachable, text)
         };
         let Candidate { robot, shape, iterations, .. } = done;

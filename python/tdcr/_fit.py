@@ -1,0 +1,350 @@
+"""Fits: parameters of a robot from measured positions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+
+import numpy as np
+
+from tdcr._core import Robot
+from tdcr._fit_model import NAMES, Measured, Problem
+from tdcr._status import Status
+from tdcr._value import Value
+from tdcr.errors import InvalidInput, NotConverged
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tdcr._core import ConstantCurvatureSettings, RodSettings
+
+    Array: TypeAlias = NDArray[np.float64]
+    Part: TypeAlias = Literal["train", "validation"]
+
+__all__ = ["Fit", "fit"]
+
+# Relative fall of the cost, and relative step, below which a round has converged.
+_FALL, _STEP = 1e-7, 1e-8
+# Directions whose curvature is below this share of the largest are not told by the data.
+_BLIND = 1e-12
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Value):
+    """Parameters fitted to measurements, and how well. Arrays are read-only.
+
+    Rows without gaps and of finite displacements are the kept ones; all arrays are over these.
+    """
+
+    robot: Robot
+    """The robot with its fitted holes, rest shape, Poisson's ratio and base. Offsets and gains of
+    displacements are not part of a robot: see `displacements`."""
+    parameters: dict[str, Array]
+    """Values by name: "offset" (K,) [m], "gain" (K,), "radius" (K,) [m], "azimuth" (K,) [rad],
+    "poisson_ratio" (1,), "rest" (2,) [1/m], "base" (6,) [m, rad]."""
+    standard_errors: dict[str, Array]
+    """Of each value, by the sandwich estimate; inf where the data do not tell it."""
+    residuals: Array
+    """Measured minus predicted positions, (rows, points, 3) [m]."""
+    residuals_before: Array
+    """The same with the robot as it was given."""
+    rows: NDArray[np.int64]
+    """Indices of the kept rows in the measurements."""
+    validation: NDArray[np.bool_]
+    """Which of the kept rows were held out."""
+    dropped: int
+    """Rows left out for their gaps (NaN)."""
+    failed: int
+    """Kept rows whose forward solve did not converge at the end; they count with the last
+    iterate."""
+    status: Status
+    """converged, or iteration_limit."""
+    message: str
+    iterations: int
+    """Levenberg-Marquardt steps."""
+    seed: int
+    """Of the split."""
+
+    _hashed: ClassVar[tuple[str, ...]] = ("robot", "residuals", "seed")
+
+    @property
+    def ok(self) -> bool:
+        """Whether it converged."""
+        return self.status is Status.converged
+
+    def require(self) -> Fit:
+        """Return the result itself, or raise `NotConverged` with its message."""
+        if self.ok:
+            return self
+        raise NotConverged(f"{self.status}: {self.message}", self)
+
+    def distances(self, part: Part = "validation", *, before: bool = False) -> Array:
+        """Distances of predicted from measured points of a part of the rows, flat [m]."""
+        if part not in ("train", "validation"):
+            message = f'part: expected "train" or "validation", got {part!r}'
+            raise InvalidInput(message, "part")
+        residuals = self.residuals_before if before else self.residuals
+        rows = self.validation if part == "validation" else ~self.validation
+        flat: Array = np.linalg.norm(residuals[rows], axis=2).ravel()
+        return flat
+
+    def rms(self, part: Part = "validation", *, before: bool = False) -> float:
+        """Root of the mean squared distance of a part of the rows [m]; NaN for no rows."""
+        distances = self.distances(part, before=before)
+        return float(np.sqrt(np.mean(distances**2))) if distances.size else float("nan")
+
+    def mean(self, part: Part = "validation", *, before: bool = False) -> float:
+        """Mean distance of a part of the rows [m]; NaN for no rows."""
+        distances = self.distances(part, before=before)
+        return float(np.mean(distances)) if distances.size else float("nan")
+
+    def displacements(self, given: ArrayLike) -> Array:
+        """Displacements for `forward` on `robot` from those of the measurements, (..., K) [m]."""
+        count = len(self.robot.tendons)
+        gain = self.parameters.get("gain", np.ones(count))
+        shifted: Array = np.asarray(given, dtype=np.float64) * gain
+        return shifted + self.parameters.get("offset", np.zeros(count))
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw which share of the held-out points (all, if none were) is within a distance.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        if ax is None:
+            from matplotlib.figure import Figure
+
+            ax = Figure(layout="constrained").add_subplot()
+        part: Part = "validation" if self.validation.any() else "train"
+        for before, colour, label in ((True, "#9AA5B1", "before"), (False, "#C8553D", "after")):
+            distances = np.sort(self.distances(part, before=before)) * 1e3
+            share = np.arange(1, len(distances) + 1) / len(distances)
+            mean = self.mean(part, before=before) * 1e3
+            ax.step(distances, share, color=colour, label=f"{label}, mean {mean:.1f} mm")
+        ax.set(xlabel="distance [mm]", ylabel=f"share of the {part} points", ylim=(0, 1))
+        ax.grid(True)
+        ax.legend(frameon=False)
+        return ax
+
+    def __repr__(self) -> str:
+        """Tell what was fitted and how well."""
+        part: Part = "validation" if self.validation.any() else "train"
+        before, after = self.rms(part, before=True), self.rms(part)
+        names = ", ".join(self.parameters)
+        return f"<Fit of {names}, {self.status}, {part} rms {before:.3g} m before, {after:.3g} m>"
+
+
+def fit(
+    robot: Robot,
+    measurements: ArrayLike,
+    parameters: Sequence[str],
+    *,
+    displacements: ArrayLike,
+    model: str = "rod",
+    settings: RodSettings | ConstantCurvatureSettings | None = None,
+    validation: float = 0.2,
+    seed: int = 0,
+    robust: bool = True,
+    max_iterations: int = 50,
+) -> Fit:
+    """Estimate parameters of a robot from measured positions under many pulls.
+
+    Levenberg-Marquardt steps on the distances between measured and predicted points: first least
+    squares, then, if `robust`, the soft-L1 loss with twice the median distance as its scale.
+    Derivatives are exact for the rod and the base (`sensitivity`), and central differences of the
+    constant-curvature model.
+
+    Parameters
+    ----------
+    robot : Robot
+        Where the fit starts. Its tool is what is measured if only one point is.
+    measurements : array_like, shape (B, 3) or (B, n + 1, 3)
+        Positions of the tool point, or of all disks, world frame [m]. Rows with gaps (NaN) are
+        dropped and counted.
+    parameters : sequence of str
+        What to estimate: "offset" and "gain" of each displacement (used are gain * displacement +
+        offset), "radius" and "azimuth" of each tendon's holes (straight tendons), "poisson_ratio",
+        "rest" (a curvature about x and y, added to the rest shape), "base" (a shift, and a rotation
+        about the base's origin, world axes).
+    displacements : array_like, shape (B, K)
+        As for `forward_batch` [m]: negative pulls, `inf` is free.
+    model : {"rod", "constant_curvature"}, optional
+        The latter has no "poisson_ratio" and no "rest".
+    settings : RodSettings or ConstantCurvatureSettings, optional
+    validation : float, optional
+        Share of the rows that is held out, in [0, 0.9].
+    seed : int, optional
+        Of the split.
+    robust : bool, optional
+    max_iterations : int, optional
+        Steps at most, of both rounds.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InvalidInput
+        Arrays of another shape, infinite measurements, no row without gaps, fewer numbers than
+        unknowns, a parameter that is unknown, repeated or not one of the model's.
+    """
+    if max_iterations < 1:
+        message = f"max_iterations: expected at least 1, got {max_iterations}"
+        raise InvalidInput(message, "max_iterations")
+    problem, measured = _checked(
+        robot, displacements, measurements, parameters, model, settings, validation
+    )
+    count = len(measured.points)
+    held = np.zeros(count, dtype=bool)
+    order = np.random.default_rng(seed).permutation(count)
+    held[order[: round(validation * count)]] = True
+    train = measured.only(~held)
+    if train.points.size <= problem.size:
+        raise InvalidInput(
+            f"measurements: expected more numbers to fit to than unknowns ({problem.size}), "
+            f"got {train.points.size}",
+            "measurements",
+        )
+    values = problem.start()
+    before, _ = problem.residuals(values, measured)
+    values, iterations, done = _descend(problem, train, values, np.inf, max_iterations)
+    scale = np.inf
+    if robust and done:
+        distances = np.linalg.norm(problem.residuals(values, train)[0], axis=2)
+        # Data without noise have no outliers either.
+        scale = max(2 * float(np.median(distances)), 1e-9 * robot.backbone.total_length)
+        rest = max_iterations - iterations
+        values, more, done = _descend(problem, train, values, scale, rest)
+        iterations += more
+    errors = _standard_errors(problem, train, values, scale)
+    after, solved = problem.residuals(values, measured)
+    status = Status.converged if done else Status.iteration_limit
+    for array in (after, before, measured.rows, held):
+        array.flags.writeable = False
+    return Fit(
+        robot=problem.robot(values),
+        parameters=problem.named(values),
+        standard_errors=problem.named(errors),
+        residuals=after,
+        residuals_before=before,
+        rows=measured.rows,
+        validation=held,
+        dropped=measured.dropped,
+        failed=int(np.count_nonzero(~solved)),
+        status=status,
+        message="" if done else f"still falling after {iterations} iterations",
+        iterations=iterations,
+        seed=seed,
+    )
+
+
+def _checked(
+    robot: Robot,
+    displacements: ArrayLike,
+    measurements: ArrayLike,
+    parameters: Sequence[str],
+    model: str,
+    settings: Any,
+    validation: float,
+) -> tuple[Problem, Measured]:
+    if not isinstance(robot, Robot):
+        raise TypeError(f"robot: expected Robot, got {type(robot).__name__}")
+    if model not in ("rod", "constant_curvature"):
+        message = f'model: expected "rod" or "constant_curvature", got {model!r}'
+        raise InvalidInput(message, "model")
+    if not 0 <= validation <= 0.9:
+        message = f"validation: expected a share in [0, 0.9], got {validation!r}"
+        raise InvalidInput(message, "validation")
+    names = [parameters] if isinstance(parameters, str) else list(parameters)
+    known = [n for n in NAMES if model == "rod" or n not in ("poisson_ratio", "rest")]
+    if not names or len(set(names)) < len(names) or not set(names) <= set(known):
+        message = f"parameters: expected some of {known} for model {model!r}, each once"
+        raise InvalidInput(f"{message}, got {names}", "parameters")
+    for k, tendon in enumerate(robot.tendons):
+        plain = tendon.routing == "angles"
+        straight = plain and np.ndim(tendon.azimuth) == 0 and np.ndim(tendon.radius) == 0
+        if not straight and {"radius", "azimuth"} & set(names):
+            message = f"parameters: expected straight tendons to fit holes of, got tendons[{k}]"
+            raise InvalidInput(message, "parameters")
+    return Problem(robot, names, model, settings), Measured.checked(
+        robot, displacements, measurements
+    )
+
+
+def _weights(residuals: Array, solved: NDArray[np.bool_], scale: float) -> tuple[Array, float]:
+    """Weights of the points (rows, points) and cost, of the soft-L1 loss."""
+    squares: Array = (residuals**2).sum(axis=2)
+    if np.isinf(scale):
+        weights: Array = np.repeat(solved[:, None], squares.shape[1], axis=1).astype(np.float64)
+        return weights, float(squares.sum())
+    root: Array = np.sqrt(1 + squares / scale**2)
+    weights = solved[:, None] / root
+    return weights, float((2 * scale**2 * (root - 1)).sum())
+
+
+def _descend(
+    problem: Problem, measured: Measured, values: Array, scale: float, budget: int
+) -> tuple[Array, int, bool]:
+    """Levenberg-Marquardt steps: values, steps taken, whether they converged."""
+    damping = 1e-4
+    residuals, solved = problem.residuals(values, measured)
+    weights, cost = _weights(residuals, solved, scale)
+    for iteration in range(budget):
+        jacobian = problem.jacobian(values, measured) / problem.scales[:, None, None, None]
+        weighted = jacobian * weights[:, :, None]
+        gram = np.einsum("aijk,bijk->ab", weighted, jacobian, optimize=True)
+        slope = np.einsum("aijk,ijk->a", weighted, residuals)
+        while True:
+            damped = gram + damping * np.diag(np.maximum(np.diag(gram), 1e-300))
+            step = np.linalg.lstsq(damped, slope, rcond=1e-14)[0]
+            small = np.abs(step).max() <= _STEP
+            moved = problem.bounded(values + step / problem.scales)
+            trial, trial_solved = problem.residuals(moved, measured)
+            trial_weights, trial_cost = _weights(trial, trial_solved, scale)
+            if trial_cost < cost:
+                break
+            damping *= 10
+            if small or damping > 1e10:
+                return values, iteration + 1, True
+        fall = (cost - trial_cost) / max(cost, 1e-300)
+        values, residuals, weights, cost = moved, trial, trial_weights, trial_cost
+        damping = max(damping / 10, 1e-12)
+        if fall < _FALL or small:
+            return values, iteration + 1, True
+    return values, budget, False
+
+
+def _standard_errors(problem: Problem, measured: Measured, values: Array, scale: float) -> Array:
+    """Root of the sandwich estimate's diagonal; rows are independent, points of a row are not.
+
+    Every row's residual is that of a fit without it, by its leverage: HC3 of MacKinnon & White
+    (1985), which holds for few rows too.
+    """
+    residuals, solved = problem.residuals(values, measured)
+    weights, _ = _weights(residuals, solved, scale)
+    count, numbers = len(residuals), residuals[0].size
+    jacobian = problem.jacobian(values, measured) / problem.scales[:, None, None, None]
+    # The loss is flatter along a residual than its weight says: its second derivative is
+    # w - w^3 r r^T / s^2.
+    along = np.einsum("aijk,ijk->aij", jacobian, residuals)
+    flatter = np.einsum("aij,ij,bij->ab", along, weights**3 / scale**2, along, optimize=True)
+    weighted = (jacobian * weights[:, :, None]).reshape(-1, count, numbers)
+    jacobian = jacobian.reshape(-1, count, numbers)
+    gram = np.einsum("aim,bim->ab", weighted, jacobian, optimize=True) - flatter
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    curvature, axes = np.linalg.eigh(gram / size / size[:, None])
+    seen = curvature > _BLIND * curvature[-1]
+    inverse = (axes[:, seen] / curvature[seen]) @ axes[:, seen].T / size / size[:, None]
+    leverage = np.einsum("aim,ab,bik->imk", jacobian, inverse, weighted, optimize=True)
+    without = np.linalg.pinv(np.eye(numbers) - leverage) @ residuals.reshape(count, numbers, 1)
+    scores = np.einsum("aim,im->ai", weighted, without[:, :, 0])
+    errors = np.sqrt(np.diag(inverse @ (scores @ scores.T) @ inverse))
+    blind = (np.abs(axes[:, ~seen]) > 1e-4).any(axis=1) | (np.diag(gram) == 0)
+    return np.where(blind, np.inf, errors / problem.scales)
