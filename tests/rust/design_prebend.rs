@@ -1,12 +1,14 @@
 //! Pre-bent design: round trips, the sphere finger, the same shape by different pulls.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Matrix4, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tdcr::Status;
-use tdcr::design::{PrebendSettings, points_on_curve, prebend};
+use tdcr::design::{PrebendSettings, points_on_curve, prebend, prebend_stopped_by};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
 use tdcr::rod::{Plan, Rod, RodSettings, Subsegment, TendonRule};
@@ -152,7 +154,18 @@ fn what_cannot_be_reached_is_said() {
     let far: Vec<_> = (1..=9).map(|i| Vector3::new(0.05 * f64::from(i), 0.0, 0.1)).collect();
     let answer = prebend(&robot, &far, &[-0.005], &PrebendSettings::default()).unwrap();
     assert_ne!(answer.status, Status::Converged);
-    assert!(!answer.message.is_empty());
+    assert!(answer.message.contains("from disk 0 to disk 1"), "{}", answer.message);
     let error = prebend(&robot, &far[1..], &[-0.005], &PrebendSettings::default()).unwrap_err();
     assert_eq!(error.argument, "target_positions");
+}
+
+#[test]
+fn a_flag_ends_a_design() {
+    let (robot, curve) = finger(0.064);
+    let targets = points_on_curve(&robot, &curve, Subsegment::Arc).unwrap();
+    let rod = RodSettings { tendons: TendonRule::Proportional, ..Default::default() };
+    let settings = PrebendSettings { rod, ..Default::default() };
+    let stop = Arc::new(AtomicBool::new(true));
+    let answer = prebend_stopped_by(&robot, &targets, &[-0.005], &settings, &stop).unwrap();
+    assert_eq!(answer.status, Status::IterationLimit);
 }
