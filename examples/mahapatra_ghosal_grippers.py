@@ -59,7 +59,7 @@ def cube_gripper() -> tuple[tdcr.Gripper, tdcr.Box]:
     return tdcr.Gripper(fingers), tdcr.Box((0, 0, 0.165), (0.025, 0.025, 0.025))
 
 
-def turn_cube(most: float = 0.005, steps: int = 20) -> tuple[np.ndarray, list[np.ndarray], list]:
+def turn_cube(most: float = 0.0045, steps: int = 20) -> tuple[np.ndarray, list[np.ndarray], list]:
     """Hold the cube, then pull the second tendon: pulls [m], moments on the cube [N m], grasps."""
     gripper, cube = cube_gripper()
     held = gripper.close([[-0.006, np.inf], [-0.006], [-0.006]], cube, steps=12).shapes[-1]
