@@ -13,7 +13,7 @@ use tdcr::design::{self, points_on_curve, prebend_stopped_by};
 use tdcr::rod::Subsegment;
 
 use crate::arguments::{number, whole};
-use crate::convert::{frozen, frozen_points, invalid, status, vectors};
+use crate::convert::{called, frozen, frozen_points, invalid, status, vectors};
 use crate::forward::{Choice, one_row};
 use crate::long_call;
 use crate::robot::Robot;
@@ -134,11 +134,7 @@ impl PrebendSettings {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let mut fields = Vec::new();
-        for (name, value) in keywords(py, &self.0)? {
-            fields.push(format!("{name}={}", value.repr()?));
-        }
-        Ok(format!("PrebendSettings({})", fields.join(", ")))
+        called("PrebendSettings", &keywords(py, &self.0)?)
     }
 
     fn __getnewargs_ex__<'py>(

@@ -10,7 +10,7 @@ use tdcr::InvalidInput;
 use tdcr::solve::pso::{self, Bounds, Sampling, Topology};
 
 use crate::arguments::{number, whole};
-use crate::convert::invalid;
+use crate::convert::{called, invalid};
 
 /// What a swarm is, and when it stops.
 ///
@@ -341,11 +341,7 @@ impl PsoSettings {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let mut fields = Vec::new();
-        for (name, value) in keywords(py, &self.0)? {
-            fields.push(format!("{name}={}", value.repr()?));
-        }
-        Ok(format!("PsoSettings({})", fields.join(", ")))
+        called("PsoSettings", &keywords(py, &self.0)?)
     }
 
     fn __getnewargs_ex__<'py>(

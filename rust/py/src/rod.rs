@@ -15,7 +15,7 @@ use tdcr::robot::Robot;
 use tdcr::rod::{self, Plan, Rod, Subsegment, TendonRule, Workspace};
 
 use crate::arguments::whole;
-use crate::convert::{float_array, invalid, type_name, values, wrong_shape};
+use crate::convert::{called, float_array, invalid, type_name, values, wrong_shape};
 use crate::forward::Choice;
 use crate::long_call;
 use crate::robot::Robot as PyRobot;
@@ -157,13 +157,8 @@ impl RodSettings {
         hasher.finish()
     }
 
-    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let (_, keywords) = slf.get().__getnewargs_ex__(slf.py())?;
-        let mut given = Vec::new();
-        for (name, value) in keywords {
-            given.push(format!("{name}={}", value.repr()?));
-        }
-        Ok(format!("RodSettings({})", given.join(", ")))
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        called("RodSettings", &keywords(py, &self.0)?)
     }
 
     fn __getnewargs_ex__<'py>(

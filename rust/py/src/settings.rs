@@ -12,7 +12,7 @@ use tdcr::rod::RodSettings;
 use tdcr::solve::pso::PsoSettings;
 
 use crate::arguments::{OneOrMany, number, whole};
-use crate::convert::{invalid, one_or_tuple};
+use crate::convert::{called, invalid, one_or_tuple};
 use crate::design;
 use crate::pso_settings::{self, PsoSettings as PyPsoSettings};
 use crate::rod;
@@ -329,12 +329,7 @@ impl InverseSettings {
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let (_, keywords) = slf.get().__getnewargs_ex__(slf.py())?;
-        let mut given = Vec::new();
-        for (name, value) in keywords {
-            given.push(format!("{name}={}", value.repr()?));
-        }
-        Ok(format!("InverseSettings({})", given.join(", ")))
+        called("InverseSettings", &slf.get().__getnewargs_ex__(slf.py())?.1)
     }
 
     fn __getnewargs_ex__<'py>(

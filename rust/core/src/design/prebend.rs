@@ -136,13 +136,13 @@ pub fn prebend_stopped_by(
     let design = Design { robot, targets, displacements, settings, stop };
     let start = match design.marched()? {
         Some(candidate) if design.met(&candidate) && settings.smoothness == 0.0 => {
-            return design.told(&candidate);
+            return design.told(candidate);
         }
         Some(candidate) => candidate,
         None => design.solved(design.own_rest(), None, 0)?,
     };
     let refined = design.refine(start)?;
-    design.told(&refined)
+    design.told(refined)
 }
 
 struct Design<'a> {
@@ -160,6 +160,8 @@ struct Candidate {
     rest: Vec<Vector3<f64>>,
     shape: Shape,
     iterations: usize,
+    /// The shape is what comes of pulling it from rest.
+    cold: bool,
 }
 
 impl Design<'_> {
@@ -190,7 +192,7 @@ impl Design<'_> {
             None => rod.solve(self.displacements, &mut work)?,
         };
         let shape = rod.result(self.displacements, report, work);
-        Ok(Candidate { robot, rest, shape, iterations })
+        Ok(Candidate { robot, rest, shape, iterations, cold: near.is_none() })
     }
 
     /// By marching along the wanted places.
@@ -328,9 +330,13 @@ impl Design<'_> {
         Ok(best)
     }
 
-    fn told(&self, candidate: &Candidate) -> Result<Prebend, InvalidInput> {
+    fn told(&self, candidate: Candidate) -> Result<Prebend, InvalidInput> {
         // What it does when it is pulled from rest.
-        let done = self.solved(candidate.rest.clone(), None, candidate.iterations)?;
+        let done = if candidate.cold {
+            candidate
+        } else {
+            self.solved(candidate.rest, None, candidate.iterations)?
+        };
         let errors = self.errors(&done.shape);
         let worst = errors.iter().copied().fold(0.0_f64, f64::max);
         let (status, message) = if done.shape.report.status != Status::Converged {

@@ -15,9 +15,9 @@ const HARD: f64 = 1e-9;
 const EASY_STEPS: usize = 12;
 /// Evaluations that one way may take.
 const WAY: usize = 70;
-/// Compliance of the softest tendons, in what the rod itself gives; it falls to rigid through this range, by
-/// factors from the first towards the last, which is too near 1 to go on.
-const SOFT: (f64, f64) = (1.0, 1e-7);
+/// Share of what the rod itself gives, which soft tendons begin with, below which they are rigid; from there to
+/// here they go by factors from the first towards the last, which is too near 1 to go on.
+const RIGID: f64 = 1e-7;
 const FACTOR: (f64, f64) = (0.1, 0.7);
 /// No strain moves further in one step \[rad\].
 const STEP: f64 = 0.5;
@@ -115,11 +115,11 @@ impl Ascent {
         }
         self.start.restore(chain);
         chain.assemble(plan, EASY);
-        let scale = SOFT.0 * chain.softness();
+        let scale = chain.softness();
         let (mut factor, mut next) = (FACTOR.0, scale);
         let mut soft = f64::INFINITY;
         loop {
-            chain.give = if next < SOFT.1 * scale { 0.0 } else { next };
+            chain.give = if next < RIGID * scale { 0.0 } else { next };
             self.start.keep(chain);
             let (ending, left) = self.within(plan, chain, budget);
             if ending == Ending::Converged {

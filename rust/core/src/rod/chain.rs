@@ -104,6 +104,20 @@ impl Chain {
         self.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
+    /// Bounds of the lengths for displacements (infinite: free, and without tension).
+    pub(super) fn bound(&mut self, plan: &Plan, displacements: &[f64]) {
+        self.bounds.clear();
+        let rest = plan.rest_lengths.iter();
+        self.bounds.extend(rest.zip(displacements).map(|(length, d)| length + d));
+        self.taut.clear();
+        self.taut.extend(displacements.iter().map(|d| d.is_finite()));
+        for (tension, d) in self.tensions.iter_mut().zip(displacements) {
+            if !d.is_finite() {
+                *tension = 0.0;
+            }
+        }
+    }
+
     /// Derivatives, factors and the Schur complement at the point at hand, and what is left there. Subsegments
     /// that are off balance by more than `balance` \[rad of their own stiffness\] are brought nearer first, each by itself.
     pub(super) fn assemble(&mut self, plan: &Plan, balance: f64) -> Left {
@@ -337,13 +351,15 @@ fn factorize(hessian: &mut [f64], whole: &mut Vec<f64>, size: usize, stiffness: 
     whole.clear();
     whole.extend_from_slice(hessian);
     cholesky(hessian, size) || {
-        raise(hessian, whole, size, stiffness);
+        raise(hessian, whole, size, stiffness, 2.0);
         false
     }
 }
 
+/// Factors `whole`, which is not positive definite, in `hessian`, with a share of the stiffness on its diagonal
+/// that grows by `factor` until it is.
 #[cold]
-fn raise(hessian: &mut [f64], whole: &[f64], size: usize, stiffness: f64) {
+pub(super) fn raise(hessian: &mut [f64], whole: &[f64], size: usize, stiffness: f64, factor: f64) {
     let mut shift = SHIFT * stiffness;
     loop {
         hessian.copy_from_slice(whole);
@@ -359,6 +375,6 @@ fn raise(hessian: &mut [f64], whole: &[f64], size: usize, stiffness: f64) {
         if cholesky(hessian, size) {
             return;
         }
-        shift *= 2.0;
+        shift *= factor;
     }
 }

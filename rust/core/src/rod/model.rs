@@ -190,7 +190,7 @@ impl<'r> Rod<'r> {
     /// From the strains and tensions at hand to the displacements; evaluations that took.
     fn ascend(&self, displacements: &[f64], work: &mut Workspace) -> usize {
         let plan = self.plan;
-        self.bound(displacements, work);
+        work.chain.bound(plan, displacements);
         self.listen(work);
         if plan.settings.tendons == TendonRule::Proportional {
             return self.solve_pieces(displacements, work);
@@ -199,20 +199,6 @@ impl<'r> Rod<'r> {
         let Workspace { ascent, chain, .. } = work;
         (work.ending, work.left) = nudge::climb(ascent, plan, chain, &mut budget);
         plan.settings.max_iterations - budget
-    }
-
-    fn bound(&self, displacements: &[f64], work: &mut Workspace) {
-        let chain = &mut work.chain;
-        chain.bounds.clear();
-        let rest = self.plan.rest_lengths.iter();
-        chain.bounds.extend(rest.zip(displacements).map(|(length, d)| length + d));
-        chain.taut.clear();
-        chain.taut.extend(displacements.iter().map(|d| d.is_finite()));
-        for (tension, d) in chain.tensions.iter_mut().zip(displacements) {
-            if !d.is_finite() {
-                *tension = 0.0;
-            }
-        }
     }
 
     /// The solved quantities, and how the solve ended.

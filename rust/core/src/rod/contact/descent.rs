@@ -19,8 +19,6 @@ const BACKTRACKS: usize = 30;
 const ARMIJO: f64 = 1e-4;
 /// Share of a value that its rounding may be.
 const ROUNDING: f64 = 1e-14;
-/// Compliance of the conditions, as a share of what the rod itself gives at its stiffest.
-pub(super) const GIVE: f64 = 1.0;
 /// Every renewal of the estimates makes the conditions stiffer by this.
 const STIFFER: f64 = 0.1;
 const STIFFEST: f64 = 1e4;
@@ -388,5 +386,5 @@ pub(super) fn contact_give(plan: &Plan) -> f64 {
         let length = plan.length(i);
         length * length * plan.settings.elements as f64 / data.stiffness[0]
     });
-    GIVE * gives.fold(f64::INFINITY, f64::min) * plan.data.len() as f64
+    gives.fold(f64::INFINITY, f64::min) * plan.data.len() as f64
 }

@@ -1,6 +1,6 @@
 //! The rod among obstacles and under loads as a forward model.
 
-use super::descent::{Descent, GIVE, Left, Surroundings, contact_give};
+use super::descent::{Descent, Left, Surroundings, contact_give};
 use super::merit::Held;
 use super::scene::Scene;
 use crate::error::InvalidInput;
@@ -114,11 +114,7 @@ impl<'r> LoadedRod<'r> {
         let plan = self.plan();
         let chain = &mut work.chain;
         chain.rest(plan);
-        chain.bounds.clear();
-        let rest = plan.rest_lengths.iter();
-        chain.bounds.extend(rest.zip(displacements).map(|(length, d)| length + d));
-        chain.taut.clear();
-        chain.taut.extend(displacements.iter().map(|d| d.is_finite()));
+        chain.bound(plan, displacements);
         chain.give = 0.0;
         chain.assemble(plan, f64::INFINITY);
         work.descent.here.strains.clone_from(&chain.strains);
@@ -136,7 +132,7 @@ impl<'r> LoadedRod<'r> {
         estimates.give = give;
         estimates.stiffness = 1.0;
         estimates.tendon_give.clear();
-        let own = (0..count).map(|k| (GIVE * work.chain.schur[k * (count + 1)]).max(give));
+        let own = (0..count).map(|k| work.chain.schur[k * (count + 1)].max(give));
         estimates.tendon_give.extend(own);
     }
 

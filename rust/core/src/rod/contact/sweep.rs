@@ -10,12 +10,10 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use super::field::{Field, bracket};
 use crate::lie::Pose;
 use crate::lie::so3::hat;
+use crate::rod::chain::raise;
 use crate::rod::plan::Plan;
 use crate::rod::subsegment::{Derivatives, Local, Node};
 use crate::solve::quadratic::{backward, cholesky, dot, forward};
-
-/// A block that is not positive definite gets this share of its stiffness, and more.
-const SHIFT: f64 = 1e-3;
 
 /// What a sweep is made at.
 pub(super) struct At<'a> {
@@ -209,7 +207,7 @@ impl Sweep {
                 self.unstable = Some(i);
                 escape(&self.block, size, &mut self.escape);
             }
-            raise(factor, &self.block, size, stiffness);
+            raise(factor, &self.block, size, stiffness, 4.0);
         }
     }
 
@@ -390,25 +388,4 @@ fn escape(matrix: &[f64], size: usize, out: &mut Vec<f64>) {
     let vector = eigen.eigenvectors.column(least);
     let sign = vector[vector.iamax()].signum();
     out.extend(vector.iter().map(|x| x * sign));
-}
-
-#[cold]
-fn raise(factor: &mut [f64], block: &[f64], size: usize, stiffness: f64) {
-    let mut shift = SHIFT * stiffness;
-    loop {
-        factor.copy_from_slice(block);
-        for k in 0..size {
-            factor[k * (size + 1)] += shift;
-        }
-        if cholesky(factor, size) {
-            return;
-        }
-        if shift > 1e12 * stiffness || shift.is_nan() {
-            // Not a number somewhere: the caller sees it in the residual.
-            factor.fill(0.0);
-            (0..size).for_each(|k| factor[k * (size + 1)] = 1.0);
-            return;
-        }
-        shift *= 4.0;
-    }
 }
