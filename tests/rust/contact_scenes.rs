@@ -307,12 +307,12 @@ fn many(count: usize, every: usize) -> f64 {
 
 #[test]
 fn a_thousand_random_scenes() {
-    // 986 as measured; the rest is flagged, most of it in tubes of few flat walls.
-    assert!(many(300, 10) > 0.98);
+    // 997 as measured; the rest is flagged.
+    assert!(many(300, 10) > 0.99);
 }
 
 #[test]
 #[ignore = "minutes"]
 fn ten_thousand_random_scenes() {
-    assert!(many(10_000, 50) > 0.98);
+    assert!(many(10_000, 50) > 0.99);
 }

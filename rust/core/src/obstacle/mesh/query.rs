@@ -96,20 +96,31 @@ impl Surface {
         out: &mut Vec<Near>,
     ) {
         let known = out.len();
-        let least = out[start..].iter().fold(f64::INFINITY, |least, e| least.min(e.distance));
-        let least = least.max(0.0);
+        // The way out of where x has sunk.
+        let tightest =
+            out[start..].iter().copied().min_by(|a, b| a.distance.total_cmp(&b.distance));
+        let Some(way) = tightest else { return };
         for hit in self.around(x, within) {
             if !self.is_hollow(hit.place, inside) {
                 continue;
             }
-            let meets = self.faces_at(&hit).iter().any(|face| {
-                let plane = self.planes[*face];
-                out[start..known].iter().any(|entry| entry.feature as usize == plane)
-            });
+            let meets = |entries: &[Near]| {
+                let there = |face: &usize| {
+                    entries.iter().any(|entry| entry.feature as usize == self.planes[*face])
+                };
+                self.faces_at(&hit).iter().any(there)
+            };
             let entry = self.plane(hit.face, x).flipped(inside);
             // A plane nearer than the surface cuts through free space, and one that x is behind may be
-            // the alternative to another, on the far side of a ridge.
-            if meets && entry.distance >= least {
+            // the alternative to another, on the far side of a ridge. But one that the way out leads out of,
+            // too, would be met all of a sudden where x comes to their common edge.
+            let holds = if way.distance < 0.0 && entry.distance < 0.0 {
+                let left = entry.distance - way.distance * entry.gradient.dot(&way.gradient);
+                left >= 0.0 && meets(&[way])
+            } else {
+                entry.distance >= way.distance.max(0.0) && meets(&out[start..known])
+            };
+            if holds {
                 push(out, start, entry);
             }
         }

@@ -17,16 +17,20 @@ const STEP: f64 = 0.5;
 /// Halvings of a step, and the share of the predicted decrease that it must deliver.
 const BACKTRACKS: usize = 30;
 const ARMIJO: f64 = 1e-4;
-/// Share of a value that its rounding may be.
-const ROUNDING: f64 = 1e-14;
-/// Every renewal of the estimates makes the conditions stiffer by this.
+/// The same where a step looks ahead to other sets of conditions.
+const FORESIGHT: usize = 3;
+/// Share of a value that its rounding may be. Steps that promise less are not judged by the value: so many may
+/// pass without the moment halving.
+const ROUNDING: f64 = 1e-12;
+const BLIND: usize = 4;
+/// Every renewal of the estimates makes the conditions stiffer by this, up to so many times the first.
 const STIFFER: f64 = 0.1;
 const STIFFEST: f64 = 1e4;
 /// Residuals are not asked to be smaller: what stiff conditions make of rounding.
-const ROUGH: f64 = 1e-10;
-/// Estimates are renewed when the shape is this near balance \[rad of the subsegments' stiffness\], and the
+const ROUGH: f64 = 5e-11;
+/// Estimates are renewed when the shape is this near balance \[rad of the whole chain\], and the
 /// more often the nearer they are.
-const LOOSE: f64 = 1e-1;
+const LOOSE: f64 = 1.0;
 /// Sets of active conditions that are tried for one step.
 const SETS: usize = 8;
 /// The least shift of the Hessian where steps turn out too long, in shares of the stiffness, the largest, and how
@@ -34,9 +38,12 @@ const SETS: usize = 8;
 const SHIFT: f64 = 1e-5;
 const SHIFTS: f64 = 1e2;
 const CHANGE: f64 = 8.0;
-/// A nudge off a saddle \[rad\], and how often.
-const NUDGE: f64 = 1e-2;
+/// A nudge off a saddle \[rad, all subsegments together\], and how often.
+const NUDGE: f64 = 1e-1;
 const NUDGES: usize = 6;
+/// Steps on which a shape may be unstable before it is nudged, if its slope does not lead out \[rad\].
+const BALANCED: usize = 3;
+const SYMMETRIC: f64 = 1e-9;
 
 /// What a descent is made in.
 pub(super) struct Surroundings<'a> {
@@ -95,6 +102,11 @@ pub(super) struct Descent {
     shift: f64,
     /// Whether stability was looked at with it.
     shifted: bool,
+    /// Steps in a row at unstable shapes.
+    balanced: usize,
+    /// Steps too small for the value to tell since the moment halved last, and what it was then.
+    blind: usize,
+    halved: f64,
 }
 
 impl Descent {
@@ -107,8 +119,10 @@ impl Descent {
     ) -> Result<(Ending, Left), Fault> {
         let tolerance = around.plan.settings.tolerance.max(ROUGH);
         let mut left = Left::default();
-        let mut loose = LOOSE;
+        let loosest = LOOSE / around.plan.data.len() as f64;
+        let mut loose = loosest;
         self.shift = 0.0;
+        (self.balanced, self.blind, self.halved) = (0, 0, f64::INFINITY);
         self.evaluate_here(around)?;
         loop {
             self.factor(around);
@@ -129,7 +143,14 @@ impl Descent {
                 }
                 self.nudge(around)?;
                 left.nudged += 1;
-                loose = LOOSE;
+                loose = loosest;
+                continue;
+            }
+            self.balanced = if self.unstable.is_some() { self.balanced + 1 } else { 0 };
+            if self.balanced >= BALANCED && left.nudged < NUDGES && self.symmetric(around.plan) {
+                self.nudge(around)?;
+                left.nudged += 1;
+                loose = loosest;
                 continue;
             }
             if *budget == 0 {
@@ -138,6 +159,11 @@ impl Descent {
             if left.moment <= loose && left.length > tolerance {
                 self.renew();
                 loose = (0.1 * loose).max(0.5 * tolerance);
+                self.evaluate_here(around)?;
+                self.factor(around);
+            }
+            if self.stalled(left.moment) {
+                self.soften();
                 self.evaluate_here(around)?;
                 self.factor(around);
             }
@@ -192,8 +218,7 @@ impl Descent {
     }
 
     fn sweep_once(&mut self, around: &Surroundings<'_>) {
-        let give = self.estimates.give;
-        self.here.fields(around.scene, around.share, give, &self.active, &mut self.fields);
+        self.here.fields(around.scene, around.share, &self.active, &mut self.fields);
         self.tensions.clear();
         let pulls = self.here.pulls.iter().zip(&self.pulling);
         self.tensions.extend(pulls.map(|(pull, on)| if *on { *pull } else { 0.0 }));
@@ -214,7 +239,7 @@ impl Descent {
     fn foresee(&mut self, plan: &Plan) -> bool {
         let mut others = false;
         for (entry, active) in self.here.entries.iter().zip(&mut self.active) {
-            let pushes = entry.push - entry.closing(&self.sweep.moved) / self.estimates.give > 0.0;
+            let pushes = entry.push - entry.closing(&self.sweep.moved) / entry.give > 0.0;
             others |= pushes != *active;
             *active = pushes;
         }
@@ -255,42 +280,77 @@ impl Descent {
         let pushing = self.here.entries.iter().filter(|entry| entry.force > 0.0);
         estimates.forces.extend(pushing.map(Held::of));
         if estimates.stiffness < STIFFEST {
-            estimates.stiffness /= STIFFER;
-            estimates.give *= STIFFER;
-            estimates.tendon_give.iter_mut().for_each(|give| *give *= STIFFER);
+            estimates.scale(STIFFER);
         }
+    }
+
+    /// Whether the last steps were below what the value resolves, and moments do not fall either.
+    fn stalled(&mut self, moment: f64) -> bool {
+        if moment <= 0.5 * self.halved {
+            (self.halved, self.blind) = (moment, 0);
+        }
+        self.blind >= BLIND
+    }
+
+    /// Makes the conditions softer, which makes less of the rounding of places.
+    fn soften(&mut self) {
+        (self.blind, self.halved) = (0, f64::INFINITY);
+        if self.estimates.stiffness > 1.0 {
+            self.estimates.scale(1.0 / STIFFER);
+        }
+    }
+
+    /// Whether an unstable shape stays so on the way down, as the slope has no part out of it.
+    fn symmetric(&self, plan: &Plan) -> bool {
+        let (width, data) = (plan.width(), &plan.data);
+        let mut size = 0.0;
+        for (k, escape) in self.escape.iter().enumerate() {
+            size += escape * escape * data[k / width].stiffness[k % width % plan.unknowns()];
+        }
+        dot(&self.slope, &self.escape).abs() <= SYMMETRIC * size
     }
 
     /// Takes as much of the Newton step as lowers the value; false when nothing does.
     fn step(&mut self, around: &Surroundings<'_>) -> Result<bool, Fault> {
-        if dot(&self.slope, &self.sweep.step) > 0.0 {
+        if self.sweep.step != self.first {
+            // Sets that lie so far ahead that the step has to be cut are not worth it.
+            if self.along(around, FORESIGHT)? {
+                return Ok(true);
+            }
             self.sweep.step.clone_from(&self.first);
         }
+        self.along(around, BACKTRACKS)
+    }
+
+    /// Takes as much of the step, halved so often, as lowers the value.
+    fn along(&mut self, around: &Surroundings<'_>, halvings: usize) -> Result<bool, Fault> {
         let slope = dot(&self.slope, &self.sweep.step);
         let longest = self.sweep.step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
-        if slope.is_nan() || longest == 0.0 {
+        if slope.is_nan() || slope > 0.0 || longest == 0.0 {
             return Ok(false);
         }
         let whole = 1.0_f64.min(STEP / longest);
         let mut share = whole;
-        for trial in 0..BACKTRACKS {
+        for trial in 0..halvings {
             if self.goes_down(around, share, slope)? {
-                self.relax(share, whole);
-                std::mem::swap(&mut self.here, &mut self.there);
-                return Ok(true);
+                return Ok(self.take(share, whole));
             }
             if trial == 0 && share == 1.0 {
                 self.correct(around);
                 if self.goes_down(around, 1.0, slope)? {
-                    self.relax(share, whole);
-                    std::mem::swap(&mut self.here, &mut self.there);
-                    return Ok(true);
+                    return Ok(self.take(share, whole));
                 }
                 self.sweep.step.clone_from(&self.straight);
             }
             share *= 0.5;
         }
         Ok(false)
+    }
+
+    fn take(&mut self, share: f64, whole: f64) -> bool {
+        self.relax(share, whole);
+        std::mem::swap(&mut self.here, &mut self.there);
+        true
     }
 
     /// A shorter step next time if this one was cut, a longer one if not.
@@ -314,11 +374,15 @@ impl Descent {
         self.there.strains.extend(moved.map(|(own, step)| own + share * step));
         let Surroundings { plan, scene, bounds, share: loads, reach, .. } = *around;
         self.there.evaluate(plan, scene, bounds, loads, &self.estimates, reach)?;
+        let blind = -slope <= ROUNDING * self.here.size;
+        let rounding = if blind { ROUNDING } else { 1e-2 * ROUNDING };
         let wanted = self.here.value
             + ARMIJO * share * slope
-            + ROUNDING * self.here.size
+            + rounding * self.here.size
             + self.moment_work(around);
-        Ok(self.there.value <= wanted && self.passes(around))
+        let down = self.there.value <= wanted && self.passes(around);
+        self.blind += usize::from(down && blind);
+        Ok(down)
     }
 
     /// The step that meets the conditions as they bend on the way `there`, the end of the whole step, which
@@ -334,7 +398,7 @@ impl Descent {
                 continue;
             };
             let bent = there.entries[found].gap - entry.gap - entry.closing(&self.sweep.moved);
-            entry.push -= bent / self.estimates.give;
+            entry.push -= bent / entry.give;
         }
         let pulls = here.pulls.clone();
         for (k, pull) in here.pulls.iter_mut().enumerate().filter(|(k, _)| self.pulling[*k]) {
@@ -372,19 +436,12 @@ impl Descent {
 
     /// Leaves a saddle.
     fn nudge(&mut self, around: &Surroundings<'_>) -> Result<(), Fault> {
+        let whole: f64 = self.escape.iter().map(|escape| escape.abs()).sum();
         for (own, escape) in self.here.strains.iter_mut().zip(&self.escape) {
-            *own += NUDGE * escape;
+            *own += NUDGE / whole * escape;
         }
+        self.balanced = 0;
+        self.estimates.scale(self.estimates.stiffness);
         self.evaluate_here(around)
     }
-}
-
-/// Compliance of contacts: small against what the whole rod gives, which goes with the third power of their number,
-/// and not against one subsegment, lest points that slide have to keep to narrow valleys.
-pub(super) fn contact_give(plan: &Plan) -> f64 {
-    let gives = plan.data.iter().enumerate().map(|(i, data)| {
-        let length = plan.length(i);
-        length * length * plan.settings.elements as f64 / data.stiffness[0]
-    });
-    gives.fold(f64::INFINITY, f64::min) * plan.data.len() as f64
 }

@@ -25,6 +25,8 @@ pub(super) struct Entry {
     pub(super) near: Near,
     /// Distance left, the body's radius taken off \[m\].
     pub(super) gap: f64,
+    /// Compliance \[m per unit\].
+    pub(super) give: f64,
     /// Multiplier, at these estimates, and what it would be if contact could pull.
     pub(super) force: f64,
     pub(super) push: f64,
@@ -73,10 +75,13 @@ pub(super) struct Held {
 }
 
 impl Held {
+    pub(super) fn new(key: Key, force: f64, at: &Vector3<f64>, near: &Near) -> Self {
+        let normal = near.gradient;
+        Self { key, force, normal, offset: normal.dot(at) - near.distance }
+    }
+
     pub(super) fn of(entry: &Entry) -> Self {
-        let normal = entry.near.gradient;
-        let offset = normal.dot(&entry.at) - entry.near.distance;
-        Self { key: entry.key, force: entry.force, normal, offset }
+        Self::new(entry.key, entry.force, &entry.at, &entry.near)
     }
 
     /// The part as it was, for a point from which it is not seen any more.
@@ -92,14 +97,21 @@ pub(super) struct Estimates {
     pub(super) tensions: Vec<f64>,
     /// Those that are not zero, by key, in order.
     pub(super) forces: Vec<Held>,
-    /// Of each tendon and of contacts \[m per unit\].
+    /// Of each tendon and of contacts of each disk \[m per unit\].
     pub(super) tendon_give: Vec<f64>,
-    pub(super) give: f64,
+    pub(super) gives: Vec<f64>,
     /// How many times stiffer than at first they are.
     pub(super) stiffness: f64,
 }
 
 impl Estimates {
+    /// Changes all compliances by a factor.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.stiffness /= factor;
+        let all = self.tendon_give.iter_mut().chain(&mut self.gives);
+        all.for_each(|give| *give *= factor);
+    }
+
     /// Those of one point before one obstacle.
     fn of(&self, disk: usize, point: usize, obstacle: usize) -> &[Held] {
         let name = (disk, point, obstacle);
@@ -179,7 +191,7 @@ impl Merit {
         self.clear.clear();
         self.places.clear();
         for (disk, points) in scene.points.iter().enumerate() {
-            let frame = &self.frames[disk];
+            let (frame, give) = (&self.frames[disk], estimates.gives[disk]);
             for (p, point) in points.iter().enumerate() {
                 let at = frame.transform(&point.at);
                 let mut clear = f64::INFINITY;
@@ -196,12 +208,12 @@ impl Merit {
                         let gap = near.distance - point.radius;
                         let key = (disk, p, o, near.feature);
                         let own = held.iter().find(|held| moved || held.key == key);
-                        let push = own.map_or(0.0, |held| held.force) - gap / estimates.give;
+                        let push = own.map_or(0.0, |held| held.force) - gap / give;
                         let force = push.max(0.0);
                         if force > 0.0 || gap < reach {
-                            self.entries.push(Entry { key, at, near, gap, force, push });
+                            self.entries.push(Entry { key, at, near, gap, give, force, push });
                         }
-                        let worth = 0.5 * estimates.give * force * force;
+                        let worth = 0.5 * give * force * force;
                         self.value += worth;
                         self.size += worth;
                     }
@@ -215,14 +227,7 @@ impl Merit {
     }
 
     /// Potentials of the disks at this shape, where the entries of `active` push and no others.
-    pub(super) fn fields(
-        &self,
-        scene: &Scene,
-        share: f64,
-        give: f64,
-        active: &[bool],
-        out: &mut Vec<Field>,
-    ) {
+    pub(super) fn fields(&self, scene: &Scene, share: f64, active: &[bool], out: &mut Vec<Field>) {
         out.clear();
         out.resize(self.frames.len(), Field::zero());
         if scene.loaded {
@@ -235,7 +240,7 @@ impl Merit {
         }
         for (entry, _) in self.entries.iter().zip(active).filter(|(_, active)| **active) {
             let n = entry.near.gradient;
-            let curvature = n * n.transpose() / give - entry.near.hessian * entry.force;
+            let curvature = n * n.transpose() / entry.give - entry.near.hessian * entry.force;
             out[entry.key.0].add_point(&entry.at, &(n * -entry.push), &curvature);
         }
     }

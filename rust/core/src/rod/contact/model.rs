@@ -1,12 +1,12 @@
 //! The rod among obstacles and under loads as a forward model.
 
-use super::descent::{Descent, Left, Surroundings, contact_give};
+use super::descent::{Descent, Left, Surroundings};
 use super::merit::Held;
-use super::scene::Scene;
+use super::scene::{Point, Scene};
 use crate::error::InvalidInput;
 use crate::lie::Pose;
 use crate::model::{Model, Report, State};
-use crate::obstacle::Fault;
+use crate::obstacle::{Fault, Near};
 use crate::robot::Robot;
 use crate::rod::ascent::Ending;
 use crate::rod::chain::Chain;
@@ -28,6 +28,9 @@ const REACH: f64 = 0.5;
 const SLIP: f64 = 0.25;
 /// Contacts are listed up to this gap, in shares of the robot's length.
 const TOUCH: f64 = 1e-9;
+/// Compliance of a contact, as a share of what the rod gives there, and the least of tendons, as one of that at the tip.
+const GIVE: f64 = 0.1;
+const LEAST: f64 = 0.04;
 
 /// Buffers of a solve.
 #[derive(Debug, Default)]
@@ -106,7 +109,50 @@ impl<'r> LoadedRod<'r> {
         work.kept.bounds.clear();
         work.kept.bounds.extend(from);
         work.ending = Ending::Converged;
+        work.kept.forces.clear();
+        self.recall(start, work);
         self.resume(displacements, work)
+    }
+
+    /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
+    fn recall(&self, start: &State, work: &mut Workspace) {
+        let (plan, base) = (self.plan(), self.rod.robot.base());
+        let reach = self.reach();
+        let mut near = Vec::new();
+        for contact in start.contacts.iter().filter(|c| c.disk < self.scene.points.len()) {
+            let same = |p: &Point| (p.kind, p.tendon) == (contact.kind, contact.tendon);
+            let points = &self.scene.points[contact.disk];
+            let (Some(p), Some(obstacle)) =
+                (points.iter().position(same), self.scene.obstacles.get(contact.obstacle))
+            else {
+                continue;
+            };
+            let at = base.inverse().transform(&contact.point);
+            let normal = base.rotation.tr_mul(&contact.normal);
+            near.clear();
+            // A fault comes again, and is told, where the shape is evaluated.
+            if obstacle.constraints(&at, reach + points[p].radius, &mut near).is_err() {
+                return;
+            }
+            let along = |part: &Near| part.gradient.dot(&normal);
+            let Some(part) = near.iter().max_by(|a, b| along(a).total_cmp(&along(b))) else {
+                continue;
+            };
+            let key = (contact.disk, p, contact.obstacle, part.feature);
+            let force = contact.force.norm() / plan.unit;
+            work.descent.estimates.forces.push(Held::new(key, force, &at, part));
+        }
+        work.descent.estimates.forces.sort_by_key(|held| held.key);
+    }
+
+    /// How far off parts of obstacles are looked at \[m\].
+    fn reach(&self) -> f64 {
+        REACH * self.shortest()
+    }
+
+    fn shortest(&self) -> f64 {
+        let plan = self.plan();
+        (0..plan.data.len()).map(|i| plan.length(i)).fold(f64::INFINITY, f64::min)
     }
 
     /// Puts the rest shape without multipliers, and compliances that are small against the rod's.
@@ -127,12 +173,12 @@ impl<'r> LoadedRod<'r> {
 
     fn stiffen(&self, displacements: &[f64], work: &mut Workspace) {
         let (plan, count) = (self.plan(), displacements.len());
-        let give = contact_give(plan);
         let estimates = &mut work.descent.estimates;
-        estimates.give = give;
+        contact_gives(plan, &mut estimates.gives);
+        let least = LEAST * estimates.gives.last().copied().unwrap_or_default();
         estimates.stiffness = 1.0;
         estimates.tendon_give.clear();
-        let own = (0..count).map(|k| work.chain.schur[k * (count + 1)].max(give));
+        let own = (0..count).map(|k| work.chain.schur[k * (count + 1)].max(least));
         estimates.tendon_give.extend(own);
     }
 
@@ -145,7 +191,6 @@ impl<'r> LoadedRod<'r> {
         budget: &mut usize,
     ) -> Result<(), Fault> {
         let plan = self.plan();
-        let subsegment = (0..plan.data.len()).map(|i| plan.length(i)).fold(f64::INFINITY, f64::min);
         let wanted: Vec<f64> =
             plan.rest_lengths.iter().zip(displacements).map(|(l, d)| l + d).collect();
         let cold = from.is_empty();
@@ -158,11 +203,8 @@ impl<'r> LoadedRod<'r> {
             let bounds: Vec<f64> = (0..wanted.len())
                 .map(|k| {
                     let start = if start(k).is_finite() { start(k) } else { wanted[k] };
-                    if wanted[k].is_finite() {
-                        start + next * (wanted[k] - start)
-                    } else {
-                        wanted[k]
-                    }
+                    // Tendons are let out before others are pulled.
+                    if wanted[k] < start { start + next * (wanted[k] - start) } else { wanted[k] }
                 })
                 .collect();
             let around = Surroundings {
@@ -170,8 +212,8 @@ impl<'r> LoadedRod<'r> {
                 scene: self.scene,
                 share: if cold { next } else { 1.0 },
                 bounds: &bounds,
-                reach: REACH * subsegment,
-                slip: SLIP * subsegment,
+                reach: self.reach(),
+                slip: SLIP * self.shortest(),
             };
             let mut patience = PATIENCE.min(*budget);
             *budget -= patience;
@@ -338,5 +380,23 @@ impl Model for LoadedRod<'_> {
             ));
         }
         parts.join("; ")
+    }
+}
+
+/// Compliances of contacts: shares of how far the rod gives way to a force across it at each disk.
+fn contact_gives(plan: &Plan, out: &mut Vec<f64>) {
+    out.clear();
+    // Sums of 1, s and s² over the stiffness, s the place of a subsegment.
+    let (mut s, mut sums) = (0.0, [0.0; 3]);
+    for i in 0..=plan.data.len() {
+        out.push(GIVE * (s * s * sums[0] - 2.0 * s * sums[1] + sums[2]));
+        if let Some(data) = plan.data.get(i) {
+            let (l, bends) = (plan.length(i), plan.settings.elements as f64 / data.stiffness[0]);
+            let middle = s + 0.5 * l;
+            for (sum, power) in sums.iter_mut().zip([1.0, middle, middle * middle]) {
+                *sum += power * bends;
+            }
+            s += l;
+        }
     }
 }
