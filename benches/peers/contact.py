@@ -9,7 +9,8 @@ faster counts: with strains alone, and with the disks' frames as further unknown
 are sparse. The energy is half the square of the unknowns, rotations are series, derivatives exact
 and, where there is a C compiler, compiled (but for 30 subsegments in strains alone, which takes
 minutes and is far behind). Several settings are tried, and the fastest counts whose disks and
-energies are tdcr's in every step.
+energies are tdcr's in every step. Times are the processor's, of one thread each: other work on the
+machine counts less.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ SETTINGS: list[dict[str, Any]] = [
 QUICK = SETTINGS[-3:-2]
 
 Array = NDArray[np.float64]
-# Steps in order: unknowns' disk places (STEPS, n + 1, 3) [m], energies in 1/m, seconds.
+# Steps in order: disk places (STEPS, n + 1, 3) [m], energies in 1/m, seconds of the processor.
 Run = Callable[[], tuple[Array, Array, Array]]
 
 
@@ -198,9 +199,9 @@ class Statement:
             start: dict[str, Any] = {"x0": self.start, "lam_g0": 0, "lam_x0": 0}
             places, energies, seconds = [], [], []
             for bound in self.bounds:
-                begin = time.perf_counter()
+                begin = time.process_time()
                 got = solver(**start, p=bound, lbg=lower, ubg=0)
-                seconds.append(time.perf_counter() - begin)
+                seconds.append(time.process_time() - begin)
                 at, energy = self.positions(got["x"])
                 places.append(self.unit * np.asarray(at))
                 energies.append(float(energy) / self.unit)
@@ -254,9 +255,9 @@ def batches(problem: Problem) -> Array:
     robot, rows = problem.robot(), problem.path
     seconds = []
     for _ in range(10):
-        begin = time.perf_counter()
+        begin = time.process_time()
         tdcr.forward_batch(robot, rows, obstacles=problem.obstacle, threads=1, warm=True)
-        seconds.append((time.perf_counter() - begin) / STEPS)
+        seconds.append((time.process_time() - begin) / STEPS)
     return np.array(seconds)
 
 
@@ -265,9 +266,9 @@ def calls(problem: Problem) -> tuple[Array, Array, Array]:
     robot, start = problem.robot(), None
     places, energies, seconds = [], [], []
     for row in problem.path:
-        begin = time.perf_counter()
+        begin = time.process_time()
         start = tdcr.forward(robot, row, obstacles=problem.obstacle, start=start)
-        seconds.append(time.perf_counter() - begin)
+        seconds.append(time.process_time() - begin)
         places.append(start.positions)
         energies.append(start.energy)
     return np.array(places), np.array(energies), np.array(seconds)
