@@ -1,5 +1,5 @@
-//! Contact's hot paths: warm pulls in 20 steps against a ball and in a tube of triangles, time per subsegment, and
-//! loads alone. Every bench checks its answer first.
+//! Contact's hot paths: warm pulls in 20 steps around a bar, past a ball and in a tube of triangles, time per
+//! subsegment, and loads alone. Every bench checks its answer first.
 #![allow(missing_docs, clippy::unwrap_used)] // criterion's macros; a bench may stop on a bad answer.
 
 use std::f64::consts::{PI, TAU};
@@ -8,7 +8,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use nalgebra::Vector3;
 use tdcr::Status;
 use tdcr::model::Model;
-use tdcr::obstacle::{Mesh, Obstacle, Sphere};
+use tdcr::obstacle::{Cylinder, Mesh, Obstacle, Sphere};
 use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
 use tdcr::rod::contact::{LoadedRod, Loads, Scene, Workspace};
 use tdcr::rod::{Plan, RodSettings};
@@ -26,6 +26,11 @@ fn robot(n: usize) -> Robot {
 
 fn ball() -> Obstacle {
     Obstacle::new(Sphere::new(&V::new(-0.045, 0.006, 0.13), 0.02).unwrap(), false)
+}
+
+/// Across the plane of the pull.
+fn bar() -> Obstacle {
+    Obstacle::new(Cylinder::new(&V::new(-0.045, 0.0, 0.13), &V::y(), 0.02).unwrap(), false)
 }
 
 /// A straight tube of about 10,000 triangles.
@@ -75,6 +80,7 @@ fn pull(c: &mut Criterion, name: &str, n: usize, obstacle: Obstacle, most: f64) 
 
 fn pulls(c: &mut Criterion) {
     for n in [9, 30, 100] {
+        pull(c, "bar", n, bar(), 6e-3);
         pull(c, "ball", n, ball(), 6e-3);
     }
     pull(c, "tube", 9, tube(), 3e-3);

@@ -214,6 +214,50 @@ fn every_free_part_is_in_balance() {
     cuts(&case, &shape);
 }
 
+/// Everything at once: loads on all disks and the tip, a ball, two tendons of which one ends half way and one stretches.
+fn everything(subsegment: Subsegment) -> Case {
+    let helix = Routing::Helical { azimuth: 1.2, radius: 6e-3, turns: 0.2 };
+    let tendons = vec![
+        Tendon::straight(0.0, 8e-3).unwrap(),
+        Tendon::new(helix, Some(7), Some(400.0), None).unwrap(),
+    ];
+    let unit = stiffness() / (L * L);
+    let loads = Loads {
+        disk_mass: 2e-4,
+        backbone_density: 6450.0,
+        tip_force: V::new(0.8, 0.2, -0.3) * unit,
+        disk_forces: (0..13).map(|i| V::new(0.01, 0.004 * f64::from(i), 0.0) * unit).collect(),
+        ..Default::default()
+    };
+    let mut case = loaded(rod(12, tendons, None), loads);
+    case.settings.subsegment = subsegment;
+    let ball = Sphere::new(&V::new(0.05, 0.006, 0.14), 0.03).unwrap();
+    case.obstacles.push(Obstacle::new(ball, false));
+    case
+}
+
+fn pushes(shape: &Shape) -> Vec<(usize, Option<usize>)> {
+    let contacts = shape.state.contacts.iter().filter(|c| c.force.norm() > 1e-3);
+    contacts.map(|c| (c.disk, c.tendon)).collect()
+}
+
+#[test]
+fn every_free_part_is_in_balance_with_all_that_acts() {
+    for subsegment in Subsegment::ALL {
+        for moment in [0.0, 0.3] {
+            let mut case = everything(subsegment);
+            let tip_moment = V::new(0.5, -0.2, 1.0) * (moment * stiffness() / L);
+            case.loads.as_mut().unwrap().tip_moment = tip_moment;
+            let shape = case.solved(&[-9e-3, -1e-3]);
+            println!("{subsegment:?} {:?} {:?}", pushes(&shape), shape.state.tensions);
+            assert!(!pushes(&shape).is_empty());
+            assert!(shape.state.tensions.iter().all(|t| *t > 0.05), "{:?}", shape.state.tensions);
+            assert!(case.unbalance(&shape) < 1e-9);
+            cuts(&case, &shape);
+        }
+    }
+}
+
 /// The work of a growing load is what the rod stores: by the trapezoid, order 2.
 #[test]
 fn work_is_stored() {
@@ -232,4 +276,48 @@ fn work_is_stored() {
     });
     println!("{errors:?}");
     second_order(&errors);
+}
+
+/// On a ball, with tendons pulled further meanwhile: what the load and the pulls do is what rod and tendons store;
+/// the ball, which does not move, does nothing. By the trapezoid, order 2.
+#[test]
+fn work_is_stored_in_contact_too() {
+    for subsegment in Subsegment::ALL {
+        let mut touching = None;
+        let errors = [8, 16, 32].map(|steps| {
+            let (mut work, mut first, mut stored) = (0.0, 0.0, 0.0);
+            let mut last: Option<(Vec<V>, [f64; 2], Shape)> = None;
+            for step in 0..=steps {
+                let share = f64::from(step) / f64::from(steps);
+                let mut case = everything(subsegment);
+                case.loads.as_mut().unwrap().tip_force *= 0.6 + 0.4 * share;
+                let pulls = [-9e-3 - 2e-4 * share, -1e-3 - 5e-5 * share];
+                let shape = case.solved(&pulls);
+                let now = pushes(&shape);
+                assert!(!now.is_empty() && shape.state.tensions.iter().all(|t| *t > 0.01));
+                // The same points all the way, or the work would have kinks.
+                assert_eq!(*touching.get_or_insert_with(|| now.clone()), now, "{share}");
+                let (forces, _) = case.loads.as_ref().unwrap().forces(&case.robot).unwrap();
+                let stretch = 0.5 * case.robot.paths()[1].rest_length / 400.0;
+                stored = shape.state.energy + stretch * shape.state.tensions[1].powi(2);
+                if let Some((forces_before, pulls_before, before)) = last {
+                    for (i, force) in forces.iter().enumerate() {
+                        let moved =
+                            shape.state.frames[i].translation - before.state.frames[i].translation;
+                        work += 0.5 * (force + forces_before[i]).dot(&moved);
+                    }
+                    for k in 0..2 {
+                        let mean = 0.5 * (shape.state.tensions[k] + before.state.tensions[k]);
+                        work -= mean * (pulls[k] - pulls_before[k]);
+                    }
+                } else {
+                    first = stored;
+                }
+                last = Some((forces, pulls, shape));
+            }
+            (work / (stored - first) - 1.0).abs()
+        });
+        println!("{subsegment:?} {errors:?} {touching:?}");
+        second_order(&errors);
+    }
 }
