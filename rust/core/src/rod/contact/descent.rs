@@ -31,6 +31,8 @@ const ROUGH: f64 = 5e-11;
 /// Estimates are renewed when the shape is this near balance \[rad of the whole chain\], and the
 /// more often the nearer they are.
 const LOOSE: f64 = 1.0;
+/// How often the way of a point in one step is cut in halves, to see whether it leads through an obstacle.
+const CUTS: usize = 8;
 /// Sets of active conditions that are tried for one step.
 const SETS: usize = 8;
 /// The least shift of the Hessian where steps turn out too long, in shares of the stiffness, the largest, and how
@@ -136,21 +138,23 @@ impl Descent {
                 self.shift = 0.0;
                 continue;
             }
-            if left.worst() <= tolerance {
-                if self.unstable.is_none() || left.nudged >= NUDGES {
-                    let stable = self.unstable.is_none();
-                    return Ok((if stable { Ending::Converged } else { Ending::Lost }, left));
-                }
-                self.nudge(around)?;
-                left.nudged += 1;
-                loose = loosest;
-                continue;
+            if left.worst() <= tolerance && self.unstable.is_none() {
+                return Ok((Ending::Converged, left));
             }
             self.balanced = if self.unstable.is_some() { self.balanced + 1 } else { 0 };
-            if self.balanced >= BALANCED && left.nudged < NUDGES && self.symmetric(around.plan) {
-                self.nudge(around)?;
-                left.nudged += 1;
-                loose = loosest;
+            let stays = self.balanced >= BALANCED && self.symmetric(around.plan);
+            if left.worst() <= tolerance || (stays && left.nudged < NUDGES) {
+                // What soft conditions leave unstable may be a minimum under stiff ones.
+                if self.estimates.stiffness < STIFFEST {
+                    self.estimates.scale(STIFFER);
+                    self.evaluate_here(around)?;
+                } else if left.nudged < NUDGES {
+                    self.nudge(around)?;
+                    left.nudged += 1;
+                    loose = loosest;
+                } else {
+                    return Ok((Ending::Lost, left));
+                }
                 continue;
             }
             if *budget == 0 {
@@ -380,7 +384,7 @@ impl Descent {
             + ARMIJO * share * slope
             + rounding * self.here.size
             + self.moment_work(around);
-        let down = self.there.value <= wanted && self.passes(around);
+        let down = self.there.value <= wanted && self.passes(around)?;
         self.blind += usize::from(down && blind);
         Ok(down)
     }
@@ -424,14 +428,18 @@ impl Descent {
         moment.dot(&so3::log(&(to.rotation * from.rotation.transpose())))
     }
 
-    /// Whether no point can have gone through an obstacle: it went through the free space around its two
-    /// places, or slipped along a surface.
-    fn passes(&self, around: &Surroundings<'_>) -> bool {
+    /// Whether no point can have gone through an obstacle.
+    fn passes(&self, around: &Surroundings<'_>) -> Result<bool, Fault> {
         let (here, there) = (&self.here, &self.there);
         let ways = here.places.iter().zip(&there.places).zip(here.clear.iter().zip(&there.clear));
-        ways.into_iter().all(|((from, to), (before, after))| {
-            (to - from).norm() <= before.max(0.0) + after.max(0.0) + around.slip
-        })
+        for (point, ((from, to), (before, after))) in around.scene.points.iter().flatten().zip(ways)
+        {
+            let (from, to) = ((*from, *before), (*to, *after));
+            if !around.scene.leads(point.radius, from, to, around.slip, CUTS)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Leaves a saddle.

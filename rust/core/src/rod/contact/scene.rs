@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::loads::Loads;
 use crate::error::InvalidInput;
 use crate::lie::Pose;
-use crate::obstacle::Obstacle;
+use crate::obstacle::{Fault, Obstacle};
 use crate::robot::Robot;
 use crate::rod::plan::Plan;
 use crate::shape::PointKind;
@@ -73,6 +73,35 @@ impl Scene {
             moment,
             loaded,
         })
+    }
+
+    /// Whether a point may go straight from a place to another, both with the distance left there: through the
+    /// free space around them, along a surface, or no deeper than `slip` \[m\] into one.
+    pub(super) fn leads(
+        &self,
+        radius: f64,
+        from: (Vector3<f64>, f64),
+        to: (Vector3<f64>, f64),
+        slip: f64,
+        cuts: usize,
+    ) -> Result<bool, Fault> {
+        if (to.0 - from.0).norm() <= from.1.max(0.0) + to.1.max(0.0) + slip {
+            return Ok(true);
+        }
+        if cuts == 0 {
+            return Ok(false);
+        }
+        let middle = (from.0 + to.0) * 0.5;
+        let mut clear = f64::INFINITY;
+        for obstacle in &self.obstacles {
+            clear = clear.min(obstacle.nearest(&middle)?.distance - radius);
+        }
+        if clear < from.1.min(to.1).min(0.0) - slip {
+            return Ok(false);
+        }
+        let middle = (middle, clear);
+        Ok(self.leads(radius, from, middle, slip, cuts - 1)?
+            && self.leads(radius, middle, to, slip, cuts - 1)?)
     }
 }
 
