@@ -202,7 +202,7 @@ fn planar_proportional_designs_have_the_closed_form() {
 
         let rod = RodSettings { tendons: TendonRule::Proportional, ..free };
         let settings = PrebendSettings { rod, ..Default::default() };
-        let answer = prebend(&bent(&vec![0.0; 9]), &targets, &[pull], &settings).unwrap();
+        let answer = prebend(&bent(&[0.0; 9]), &targets, &[pull], &settings).unwrap();
         assert_eq!(answer.status, Status::Converged, "{}", answer.message);
         for (i, closed) in closed.iter().enumerate() {
             let own = answer.robot.backbone().rest(i);

@@ -27,13 +27,12 @@ fn robot(subsegments: usize, holes: &[Vec<usize>], count: usize) -> Robot {
     Robot::new(backbone, tendons.collect(), None, None, None).unwrap()
 }
 
+/// Holes, pulls, and the places of the disks.
+type Known = (Vec<Vec<usize>>, Vec<f64>, Vec<Vector3<f64>>);
+
 /// Holes that move on by up to `jump` of 12 from disk to disk, and the places of the disks when they are pulled by
 /// 2 to 8 % of the length; none if the rod does not follow, or a tendon is slack.
-fn known(
-    draw: &mut ChaCha8Rng,
-    tendons: usize,
-    jump: i32,
-) -> Option<(Vec<Vec<usize>>, Vec<f64>, Vec<Vector3<f64>>)> {
+fn known(draw: &mut ChaCha8Rng, tendons: usize, jump: i32) -> Option<Known> {
     let holes: Vec<Vec<usize>> = (0..tendons)
         .map(|_| {
             let mut hole = draw.random_range(0..12_i32);

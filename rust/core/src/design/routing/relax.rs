@@ -331,6 +331,7 @@ fn bounded_step(
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)] // A test may stop where it fails.
 mod tests {
     use super::*;
     use crate::design::RoutingSettings;
@@ -354,7 +355,7 @@ mod tests {
         let settings = RoutingSettings::default();
         let targets = vec![Vector3::zeros(); 5];
         let radii: PerHole =
-            robot.paths().iter().map(|p| p.holes.iter().map(|h| h.norm()).collect()).collect();
+            robot.paths().iter().map(|p| p.holes.iter().map(Vector3::norm).collect()).collect();
         let azimuths: PerHole = robot.paths().iter().map(|p| p.azimuths.clone()).collect();
         let plan = Plan::new(&robot, settings.rod).unwrap();
         let stop = Arc::default();
