@@ -136,6 +136,24 @@ def test_two_tendons_come_near():
     assert answer.relaxed_rms <= answer.rms
 
 
+@pytest.mark.parametrize("tendons", [1, 2])
+def test_no_tendon_moves_on_further_than_it_may(known, tendons):
+    settings = design.RoutingSettings(max_jump=1)
+    start = design.routing(blank(tendons), known.positions)
+    answers = [
+        design.routing(blank(tendons), known.positions, settings=settings, start=before)
+        for before in (None, start)
+    ]
+    for answer in answers:
+        jumps = np.diff(np.array(answer.holes), axis=1) % 12
+        assert np.minimum(jumps, 12 - jumps).max() <= 1
+        assert answer.rms > start.rms
+    if tendons == 1:
+        wide = design.RoutingSettings(max_jump=1, beam_width=4096)
+        best = design.routing(blank(), known.positions, settings=wide).rms
+        assert [answer.rms for answer in answers] == pytest.approx([best] * 2, rel=1e-6)
+
+
 def test_starts_and_batches(known):
     first = design.routing(blank(), known.positions)
     again = design.routing(blank(), known.positions, start=first)
@@ -197,6 +215,7 @@ def test_bad_input_names_the_argument(argument, robot, targets, options):
         ("holes", {"holes": 0}),
         ("holes", {"holes": 361}),
         ("azimuth", {"azimuth": np.inf}),
+        ("max_jump", {"max_jump": 1, "holes": None}),
         ("radius", {"radius": (0.004, 0.008)}),
         ("radius", {"radius": (0.008, 0.004), "holes": None}),
         ("radius", {"radius": (0.0, 0.004), "holes": None}),

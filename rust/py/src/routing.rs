@@ -29,8 +29,8 @@ use crate::shape::Shape;
 /// azimuth : float, optional
 ///     Azimuth of hole 0 [rad].
 /// max_jump : int, optional
-///     How many holes a tendon moves on from one disk to the next at most; None: any number. Counts
-///     with holes.
+///     How many holes a tendon moves on from one disk to the next at most; None: any number. With
+///     holes only.
 /// radius : (float, float), optional
 ///     Smallest and largest radius of holes [m], with `holes=None` only; None: the radii of the
 ///     robot's tendons.

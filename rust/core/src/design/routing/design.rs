@@ -370,14 +370,20 @@ fn message(task: &Task<'_>, out: &Routed) -> String {
     }
 }
 
-/// The nearest of so many holes.
+/// The nearest of so many holes, from disk to disk no further on than a tendon may.
 fn numbers(task: &Task<'_>, azimuths: &PerHole, count: usize) -> Holes {
-    let number = |k: usize, disk: usize| {
-        azimuths[k].get(disk).map_or(0, |azimuth| {
-            let near = |hole: usize| (azimuth - task.azimuth(hole, count)).cos();
-            let nearer = |a: &usize, b: &usize| near(*a).total_cmp(&near(*b));
-            (0..count).max_by(nearer).unwrap_or(0)
-        })
-    };
-    (0..task.disks()).map(|disk| (0..task.tendons()).map(|k| number(k, disk)).collect()).collect()
+    let mut holes = vec![vec![0; task.tendons()]; task.disks()];
+    for (k, own) in azimuths.iter().enumerate() {
+        let mut last = None;
+        for (disk, azimuth) in own.iter().enumerate() {
+            let near = |hole: &usize| (azimuth - task.azimuth(*hole, count)).cos();
+            let nearest = (0..count)
+                .filter(|hole| last.is_none_or(|last| task.allows(last, *hole, count)))
+                .max_by(|a, b| near(a).total_cmp(&near(b)));
+            let hole = nearest.unwrap_or(0);
+            holes[disk][k] = hole;
+            last = Some(hole);
+        }
+    }
+    holes
 }

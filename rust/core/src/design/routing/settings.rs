@@ -63,6 +63,10 @@ impl RoutingSettings {
         if !self.azimuth.is_finite() {
             return Err(InvalidInput::new("azimuth", "a finite number [rad]", self.azimuth));
         }
+        if let (None, Some(jump)) = (self.holes, self.max_jump) {
+            let expected = "none where any azimuth is allowed";
+            return Err(InvalidInput::new("max_jump", expected, jump));
+        }
         if let Some((low, high)) = self.radius {
             if self.holes.is_some() {
                 let expected = "none where holes are given: they have the robot's radii";

@@ -86,10 +86,8 @@ impl Field {
                 for (b, next) in to.iter().enumerate() {
                     let entry = &mut entries[a * to.len() + b];
                     let near = entry.as_ref().map_or(&[][..], |entry| &entry.strains);
-                    let allowed = stage.tendons().iter().all(|k| {
-                        let jump = base[*k].abs_diff(next[*k]);
-                        task.settings.max_jump.is_none_or(|most| jump.min(count - jump) <= most)
-                    });
+                    let allowed =
+                        stage.tendons().iter().all(|k| task.allows(base[*k], next[*k], count));
                     // What had no shape under less tension has none under more.
                     if !allowed || (!first && near.is_empty()) {
                         *entry = None;

@@ -87,6 +87,12 @@ impl Task<'_> {
         self.settings.azimuth + TAU / count as f64 * hole as f64
     }
 
+    /// Whether a tendon may move on from one hole to another.
+    pub(super) fn allows(&self, from: usize, to: usize, count: usize) -> bool {
+        let jump = from.abs_diff(to);
+        self.settings.max_jump.is_none_or(|most| jump.min(count - jump) <= most)
+    }
+
     /// Place of a hole on a disk, by its number.
     pub(super) fn hole(
         &self,
