@@ -1,6 +1,8 @@
-//! Pre-bent design: the finger around a sphere of Mahapatra & Ghosal (2024), by march, and by descent.
+//! Design: pre-bent, the finger around a sphere of Mahapatra & Ghosal (2024), by march, and by descent; and the
+//! holes of one and two tendons.
 //!
-//! `march`: one element, sliding tendons. `descent`: proportional tendons, as the paper's. Both check their answer first.
+//! `march`: one element, sliding tendons. `descent`: proportional tendons, as the paper's. `known`: a shape that 12 holes
+//! make, `near`: one that they do not. All check their answer first.
 #![allow(missing_docs, clippy::unwrap_used)] // criterion's macros; a bench may stop on a bad answer.
 
 use std::f64::consts::PI;
@@ -9,9 +11,10 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Matrix4, Vector3};
 use tdcr::Status;
-use tdcr::design::{PrebendSettings, points_on_curve, prebend};
-use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
-use tdcr::rod::{RodSettings, Subsegment, TendonRule};
+use tdcr::design::{PrebendSettings, RoutingSettings, points_on_curve, prebend, routing};
+use tdcr::model::Model;
+use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
+use tdcr::rod::{Plan, Rod, RodSettings, Subsegment, TendonRule};
 
 const PULL: f64 = -0.03 * 0.18;
 
@@ -56,5 +59,45 @@ fn designs(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, designs);
+/// Places of the disks of a straight backbone whose tendons, through holes given by number, are pulled by 10 mm.
+fn pulled(holes: &[[usize; 10]]) -> (Robot, Vec<Vector3<f64>>) {
+    let tendons = holes.iter().map(|indices| {
+        let (indices, radius) = (indices.to_vec(), PerDisk::Same(8e-3));
+        let routing = Routing::Holes { indices, count: 12, radius, azimuth: 0.0 };
+        Tendon::new(routing, None, None, None).unwrap()
+    });
+    let backbone = Backbone::new(BackboneSpec::straight(0.18, 9)).unwrap();
+    let robot = Robot::new(backbone, tendons.collect(), None, None, None).unwrap();
+    let plan = Plan::new(&robot, RodSettings::default()).unwrap();
+    let shape = Rod::new(&robot, &plan).shape(&vec![-0.01; holes.len()]).unwrap();
+    assert_eq!(shape.report.status, Status::Converged);
+    (robot.clone(), shape.state.frames[1..].iter().map(|frame| frame.translation).collect())
+}
+
+fn routings(c: &mut Criterion) {
+    let mut group = c.benchmark_group("design/routing_9_disks_12_holes");
+    group.sample_size(10);
+    let settings = RoutingSettings::default();
+    let own = [0, 1, 3, 4, 4, 3, 2, 2, 1, 0];
+    let other = [6, 6, 7, 8, 8, 9, 10, 10, 9, 9];
+    for (name, holes, off) in [
+        ("one_known", &[own][..], 0.0),
+        ("one_near", &[own][..], 1e-3),
+        ("two_near", &[own, other][..], 0.0),
+    ] {
+        let (robot, mut targets) = pulled(holes);
+        for (i, target) in targets.iter_mut().enumerate() {
+            *target += Vector3::new((3 * i) as f64, (5 * i) as f64, 0.0).map(f64::sin) * off;
+        }
+        let answer = routing(&robot, &targets, None, None, &settings).unwrap();
+        assert_eq!(answer.status == Status::Converged, name == "one_known", "{}", answer.message);
+        assert!(answer.rms < 1e-3, "{}", answer.message);
+        group.bench_function(name, |b| {
+            b.iter(|| routing(&robot, black_box(&targets), None, None, &settings));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, designs, routings);
 criterion_main!(benches);

@@ -27,6 +27,7 @@ __all__ = [
     "PsoSettings",
     "Robot",
     "RodSettings",
+    "RoutingSettings",
     "Sensitivity",
     "Shape",
     "SignedDistance",
@@ -61,6 +62,8 @@ __all__ = [
     "_prebend",
     "_pso_minimize",
     "_rotation_vector",
+    "_routing",
+    "_routing_batch",
     "_rust_defaults",
     "_shape",
     "_tendon",
@@ -77,6 +80,10 @@ __version__: str
 
 _Floats: TypeAlias = float | Sequence[float] | NDArray[np.float64]
 _Array: TypeAlias = NDArray[np.float64]
+_Holes: TypeAlias = tuple[tuple[int, ...], ...] | None
+_Routed: TypeAlias = tuple[
+    Robot, Shape, _Array, _Holes, _Array, float, float, str, int, int, Status, str
+]
 
 @final
 class Backbone:
@@ -404,6 +411,41 @@ class PrebendSettings:
     def max_bend(self) -> float: ...
     @property
     def smoothness(self) -> float: ...
+    @property
+    def tolerance(self) -> float: ...
+    @property
+    def max_iterations(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
+
+@final
+class RoutingSettings:
+    def __new__(
+        cls,
+        *,
+        rod: RodSettings | None = None,
+        holes: int | None = 12,
+        azimuth: float = 0.0,
+        max_jump: int | None = None,
+        radius: tuple[float, float] | None = None,
+        beam_width: int = 256,
+        tolerance: float = 1e-8,
+        max_iterations: int = 100,
+    ) -> Self: ...
+    @property
+    def rod(self) -> RodSettings: ...
+    @property
+    def holes(self) -> int | None: ...
+    @property
+    def azimuth(self) -> float: ...
+    @property
+    def max_jump(self) -> int | None: ...
+    @property
+    def radius(self) -> tuple[float, float] | None: ...
+    @property
+    def beam_width(self) -> int: ...
     @property
     def tolerance(self) -> float: ...
     @property
@@ -805,6 +847,21 @@ def _points_on_curve(robot: Robot, points: ArrayLike, subsegment: str) -> _Array
 def _prebend(
     robot: Robot, targets: ArrayLike, displacements: ArrayLike, settings: PrebendSettings
 ) -> tuple[Robot, Shape, _Array, int, Status, str]: ...
+def _routing(
+    robot: Robot,
+    targets: ArrayLike,
+    bounds: tuple[ArrayLike, ArrayLike] | None,
+    start: tuple[Robot, list[float]] | None,
+    settings: RoutingSettings,
+) -> _Routed: ...
+def _routing_batch(
+    robot: Robot,
+    rows: list[_Array],
+    bounds: tuple[ArrayLike, ArrayLike] | None,
+    settings: RoutingSettings,
+    threads: int | None,
+    progress: Callable[[int], object] | None,
+) -> list[_Routed]: ...
 def _pso_minimize(
     f: Callable[[_Array], object],
     lower: ArrayLike,

@@ -42,7 +42,7 @@ class Fit(Value):
     displacements are not part of a robot: see `displacements`."""
     parameters: dict[str, Array]
     """Values by name: "offset" (K,) [m], "gain" (K,), "radius" (K,) [m], "azimuth" (K,) [rad],
-    "poisson_ratio" (1,), "rest" (2,) [1/m], "base" (6,) [m, rad]."""
+    "stiffness" (K,) [N], "poisson_ratio" (1,), "rest" (2,) [1/m], "base" (6,) [m, rad]."""
     standard_errors: dict[str, Array]
     """Of each value, by the sandwich estimate; inf where the data do not tell it."""
     residuals: Array
@@ -169,13 +169,14 @@ def fit(
         dropped and counted.
     parameters : sequence of str
         What to estimate: "offset" and "gain" of each displacement (used are gain * displacement +
-        offset), "radius" and "azimuth" of each tendon's holes (straight tendons), "poisson_ratio",
+        offset), "radius" and "azimuth" of each tendon's holes (straight tendons), "stiffness" of
+        each tendon (all elastic; positions tell its ratio to the backbone's), "poisson_ratio",
         "rest" (a curvature about x and y, added to the rest shape), "base" (a shift, and a rotation
         about the base's origin, world axes).
     displacements : array_like, shape (B, K)
         As for `forward_batch` [m]: negative pulls, `inf` is free.
     model : {"rod", "constant_curvature"}, optional
-        The latter has no "poisson_ratio" and no "rest".
+        The latter has no "stiffness", no "poisson_ratio" and no "rest".
     settings : RodSettings or ConstantCurvatureSettings, optional
     validation : float, optional
         Share of the rows that is held out, in [0, 0.9].
@@ -263,7 +264,7 @@ def _checked(
         message = f"validation: expected a share in [0, 0.9], got {validation!r}"
         raise InvalidInput(message, "validation")
     names = [parameters] if isinstance(parameters, str) else list(parameters)
-    known = [n for n in NAMES if model == "rod" or n not in ("poisson_ratio", "rest")]
+    known = [n for n in NAMES if model == "rod" or n not in ("stiffness", "poisson_ratio", "rest")]
     if not names or len(set(names)) < len(names) or not set(names) <= set(known):
         message = f"parameters: expected some of {known} for model {model!r}, each once"
         raise InvalidInput(f"{message}, got {names}", "parameters")
@@ -273,6 +274,9 @@ def _checked(
         if not straight and {"radius", "azimuth"} & set(names):
             message = f"parameters: expected straight tendons to fit holes of, got tendons[{k}]"
             raise InvalidInput(message, "parameters")
+        if tendon.stiffness is None and "stiffness" in names:
+            message = "parameters: expected tendons with a stiffness [N] to fit it"
+            raise InvalidInput(f"{message}, got tendons[{k}] without one", "parameters")
     return Problem(robot, names, model, settings), Measured.checked(
         robot, displacements, measurements
     )

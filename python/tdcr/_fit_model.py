@@ -14,13 +14,13 @@ from tdcr.errors import InvalidInput, NotConverged
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tdcr._core import Robot
+    from tdcr._core import Robot, Shape
 
     Array: TypeAlias = NDArray[np.float64]
 
 __all__ = ["NAMES", "Measured", "Problem"]
 
-NAMES = ("offset", "gain", "radius", "azimuth", "poisson_ratio", "rest", "base")
+NAMES = ("offset", "gain", "radius", "azimuth", "stiffness", "poisson_ratio", "rest", "base")
 
 
 @dataclass(frozen=True)
@@ -86,15 +86,15 @@ class Problem:
     def __init__(self, robot: Robot, names: list[str], model: str, settings: Any) -> None:
         self._given, self._model, self._settings = robot, model, settings
         count, length = len(robot.tendons), robot.backbone.total_length
-        sizes = dict.fromkeys(NAMES[:4], count) | {"poisson_ratio": 1, "rest": 2, "base": 6}
+        sizes = dict.fromkeys(NAMES[:5], count) | {"poisson_ratio": 1, "rest": 2, "base": 6}
         # What changes points by about as much as a shift by the robot's length.
         units: dict[str, Any] = {
             "offset": 1 / length,
             "rest": length,
             "base": np.repeat([1 / length, 1], 3),
         }
-        if "radius" in names:
-            units["radius"] = 1 / np.array([tendon.radius for tendon in robot.tendons])
+        for name in {"radius", "stiffness"} & set(names):
+            units[name] = 1 / np.array([getattr(tendon, name) for tendon in robot.tendons])
         self._slices: dict[str, slice] = {}
         scales: list[Array] = []
         for name in names:
@@ -118,7 +118,7 @@ class Problem:
             "gain": 1.0,
             "poisson_ratio": self._given.backbone.poisson_ratio,
         }
-        for name in {"radius", "azimuth"} & set(self._slices):
+        for name in {"radius", "azimuth", "stiffness"} & set(self._slices):
             own[name] = [getattr(tendon, name) for tendon in tendons]
         values = np.zeros(self.size)
         for name, part in self._slices.items():
@@ -131,6 +131,7 @@ class Problem:
         for name, low, high in (
             ("gain", 1e-3, 1e3),
             ("radius", 1e-6, np.inf),
+            ("stiffness", 1e-3, 1e12),
             ("poisson_ratio", -0.99, 0.5),
         ):
             if name in self._slices:
@@ -149,14 +150,17 @@ class Problem:
                 own = np.zeros((backbone.count, 3)) if backbone.rest is None else backbone.rest
                 keywords["rest"] = own + backbone.lengths[:, None] * np.append(at["rest"], 0.0)
             backbone = _core.Backbone(*backbone.__getnewargs_ex__()[0], **keywords)
-        if "radius" in at or "azimuth" in at:
+        if {"radius", "azimuth", "stiffness"} & set(at):
             tendons = tuple(
-                _core.Tendon(
+                _core._tendon(
                     float(at["azimuth"][k]) if "azimuth" in at else tendon.azimuth,
                     float(at["radius"][k]) if "radius" in at else tendon.radius,
-                    end=tendon.end,
-                    stiffness=tendon.stiffness,
-                    name=tendon.name,
+                    tendon.turns,
+                    tendon.indices,
+                    tendon.count,
+                    tendon.end,
+                    float(at["stiffness"][k]) if "stiffness" in at else tendon.stiffness,
+                    tendon.name,
                 )
                 for k, tendon in enumerate(tendons)
             )
@@ -236,11 +240,12 @@ class Problem:
                     if points == 1:
                         moments[disk] = np.cross(arm, axis)
                     gradient = at.adjoint(weights, moments)
-                    for name, slopes in self._chained(robot, given, gradient).items():
+                    for name, slopes in self._chained(shape, given, gradient).items():
                         out[self._slices[name], row, j, c] = slopes
 
-    def _chained(self, robot: Robot, given: Array, by: Any) -> dict[str, Any]:
+    def _chained(self, shape: Shape, given: Array, by: Any) -> dict[str, Any]:
         """Slopes by the values from those by all that a rod is made of."""
+        robot = shape.robot
         found: dict[str, Any] = {}
         if "offset" in self._slices:
             found["offset"] = by.displacements
@@ -256,6 +261,13 @@ class Problem:
                 "azimuth": radius * (y * np.cos(angle) - x * np.sin(angle)),
             }
             found |= {name: slope for name, slope in slopes.items() if name in self._slices}
+        if "stiffness" in self._slices:
+            # A tendon may be longer by its rest length times T/EA: less of that is a pull.
+            stiffness = np.array([tendon.stiffness for tendon in robot.tendons])
+            strain = shape.tensions / stiffness
+            free = np.isinf(shape.displacements)
+            rest = (shape.tendon_lengths - np.where(free, 0.0, shape.displacements)) / (1 + strain)
+            found["stiffness"] = -by.displacements * rest * strain / stiffness
         if "poisson_ratio" in self._slices:
             found["poisson_ratio"] = by.poisson_ratio
         if "rest" in self._slices:

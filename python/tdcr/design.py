@@ -12,32 +12,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, TypeAlias
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from tdcr import _core
-from tdcr._core import PrebendSettings, Robot
+from tdcr._core import Obstacle, PrebendSettings, Robot, RoutingSettings, clearance, forward
 from tdcr._fit import Fit, fit
+from tdcr._routing import Routing, routing, routing_batch
 from tdcr._status import Status
 from tdcr._value import Value
-from tdcr.errors import InvalidInput, NotConverged
+from tdcr._wanted import on_curve, wanted_places
+from tdcr.errors import NotConverged
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from collections.abc import Iterable
+
+    from numpy.typing import ArrayLike
 
     from tdcr._core import Shape
+    from tdcr._wanted import Array, Curve
 
-    Array: TypeAlias = NDArray[np.float64]
-    Curve: TypeAlias = Callable[[float], ArrayLike]
+__all__ = [
+    "Fit",
+    "Prebend",
+    "PrebendSettings",
+    "Routing",
+    "RoutingSettings",
+    "fit",
+    "on_curve",
+    "prebend",
+    "routing",
+    "routing_batch",
+]
 
-__all__ = ["Fit", "Prebend", "PrebendSettings", "fit", "on_curve", "prebend"]
-
-# A curve given as a function is sampled so often per subsegment, and so far beyond the robot's
-# length: arcs and chords need more of a curve than their own length where it bends.
-_SAMPLES, _BEYOND = 20, 1.25
+# Gaps are told apart down to this share of a robot's length; shapes so near are one equilibrium.
+_TOUCH, _SAME = 1e-9, 1e-7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,19 +58,23 @@ class Prebend(Value):
     robot: Robot
     """The robot with its new rest shape."""
     shape: Shape
-    """Its shape under the displacements, solved from rest."""
+    """Its shape under the displacements, solved from rest, among the obstacles if there are any."""
     error: Array
     """Distance of each disk from its wanted place, (n + 1,) [m]; disk 0 is in its place."""
     iterations: int
     """Marches and Levenberg-Marquardt steps."""
     status: Status
     """converged: every disk is in its place (with `smoothness`: least sum of both); unreachable:
-    the nearest robot that was found; others: the rod does not follow the displacements."""
+    the nearest robot that was found, or obstacles stand in the way; others: the rod does not follow
+    the displacements."""
     message: str
     """What stood in the way; empty when it converged."""
     target_positions: Array
     """Wanted places of disks 1 to n, (n, 3), world frame [m]."""
     settings: PrebendSettings
+    clearance: float | None = None
+    """Least signed distance of the points that may touch from the obstacles, when the robot is
+    pulled without them: negative is inside [m]. None without obstacles."""
 
     _hashed: ClassVar[tuple[str, ...]] = ("robot", "target_positions", "settings")
 
@@ -85,6 +100,7 @@ def prebend(
     target_positions: ArrayLike | Curve,
     displacements: ArrayLike,
     *,
+    obstacles: Obstacle | Iterable[Obstacle] = (),
     settings: PrebendSettings | None = None,
 ) -> Prebend:
     """Find the rest shape that takes a wanted shape when the tendons are pulled.
@@ -93,6 +109,10 @@ def prebend(
     the answer is exact, and its rest shape has the twists of the robot's: none, if that is
     straight. Elsewhere the rest bends are found by Levenberg-Marquardt steps on the rod's exact
     derivatives.
+
+    Obstacles do not change the rest shape that is sought: wanted places clear of them are an
+    equilibrium without contact, and no rest shape has places inside them. What they change is the
+    way there: `shape` is then pulled from rest among them, and "converged" says that it arrives.
 
     Parameters
     ----------
@@ -104,19 +124,24 @@ def prebend(
         times the robot's length and on which `on_curve` finds places.
     displacements : array_like, shape (K,)
         Tendon displacements under which the shape is wanted [m]: negative pulls, `inf` is free.
+    obstacles : obstacle or sequence of obstacles, optional
+        What the robot stays outside of on its way; sliding tendons only. Its points that may touch
+        are those of `forward`.
     settings : PrebendSettings, optional
 
     Returns
     -------
     Prebend
         Places that no rest shape reaches are an outcome: the nearest robot that was found, with
-        status "unreachable" and a message that says why.
+        status "unreachable" and a message that says why. So are obstacles in the way; the robot is
+        then the one for the places without them.
 
     Raises
     ------
     InvalidInput
         Places of another shape or number, not finite, or whose first of n + 1 is not the base; a
-        curve that is too short; displacements that do not fit the robot.
+        curve that is too short; displacements that do not fit the robot; proportional tendons among
+        obstacles.
     TypeError
         A value of another type.
     KeyboardInterrupt
@@ -127,88 +152,66 @@ def prebend(
         if not isinstance(value, kind):
             got = type(value).__name__
             raise TypeError(f"{name}: expected {kind.__name__}, got {got}")
-    if callable(target_positions):
-        places = _sampled(robot, target_positions, settings.rod.subsegment)
-    else:
-        places = _disks(robot, target_positions)
+    places = wanted_places(robot, target_positions, settings.rod.subsegment)
     fields = _core._prebend(robot, places, displacements, settings)
-    return Prebend(*fields, places, settings)
+    answer = Prebend(*fields, places, settings)
+    around = (obstacles,) if isinstance(obstacles, Obstacle) else tuple(obstacles)
+    return _among(answer, around) if around else answer
 
 
-def on_curve(robot: Robot, points: ArrayLike, subsegment: str = "arc") -> Array:
-    """Find places on a curve that a robot's disks can have, one after the other.
-
-    Parameters
-    ----------
-    robot : Robot
-        Its base and the lengths of its subsegments count.
-    points : array_like, shape (m, 3)
-        At least two points along the curve [m]; a cubic spline goes through them. It is moved to
-        start at the robot's base, not turned.
-    subsegment : {"arc", "link"}, optional
-        As in `RodSettings`: links have equal chords; arcs go over into each other, the first along
-        the base's z axis.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Places of disks 1 to n, world frame [m]; read-only.
-
-    Raises
-    ------
-    InvalidInput
-        Points of another shape, fewer than two, not finite or repeated, a curve that is too short.
-    """
-    return _core._points_on_curve(robot, points, subsegment)
-
-
-def _sampled(robot: Robot, curve: Curve, subsegment: str) -> Array:
-    """Places on a curve given as a function."""
-    lengths = robot.backbone.arc_lengths
-    stations = np.linspace(0.0, _BEYOND * lengths[-1], _SAMPLES * len(lengths))
-    points = [np.asarray(curve(s)) for s in stations]
-    for s, point in zip(stations, points, strict=True):
-        if point.shape != (3,):
-            raise InvalidInput(
-                f"target_positions: expected a function that returns points of shape (3,), "
-                f"got shape {point.shape} at {s:.6g} m",
-                "target_positions",
-            )
-    try:
-        return on_curve(robot, points, subsegment)
-    except (InvalidInput, TypeError) as error:
-        message = f"target_positions: of the curve's points, {error}"
-        if isinstance(error, InvalidInput):
-            raise InvalidInput(message, "target_positions") from None
-        raise TypeError(message) from None
+def _among(free: Prebend, obstacles: tuple[Obstacle, ...]) -> Prebend:
+    """Pull a designed robot from rest among obstacles, and say what they do to it."""
+    rod, pulls = free.settings.rod, free.shape.displacements
+    shape = forward(free.robot, pulls, obstacles=obstacles, settings=rod)
+    length = free.robot.backbone.total_length
+    if shape.ok and np.abs(shape.positions - free.shape.positions).max() <= _SAME * length:
+        # The same equilibrium, to the accuracy of a solve with contacts: now to the rod's own.
+        shape = forward(free.robot, pulls, obstacles=obstacles, settings=rod, start=free.shape)
+    error = np.concatenate(
+        [[0.0], np.linalg.norm(shape.positions[1:] - free.target_positions, axis=1)]
+    )
+    error.flags.writeable = False
+    gap, where = _gap(free.shape, obstacles, rod.body_radius)
+    met = error.max() <= free.settings.tolerance * length
+    # Gaps within rounding touch.
+    deep = gap < -_TOUCH * length
+    status, parts = Status.converged, []
+    if not free.ok:
+        status, parts = free.status, [free.message]
+    elif deep:
+        status = Status.unreachable
+        parts = [f"the wanted shape is {-gap:.3e} m inside obstacles at {where}"]
+    elif not shape.ok:
+        status = shape.status
+    elif not met and not free.settings.smoothness:
+        status = Status.unreachable
+        disk = int(error.argmax())
+        parts = [
+            f"clear of the obstacles by {gap:.3e} m, the wanted shape is an equilibrium among "
+            f"them, but not the one that pulling from rest leads to: disk {disk} stays "
+            f"{error[disk]:.3e} m from its place"
+        ]
+    if status is not Status.converged and shape.message:
+        parts.append(f"among the obstacles, {shape.message}")
+    message = "; ".join(parts)
+    return replace(
+        free, shape=shape, error=error, status=status, message=message, clearance=float(gap)
+    )
 
 
-def _disks(robot: Robot, given: ArrayLike) -> Array:
-    """Places of disks 1 to n from those of all, or from themselves."""
-    try:
-        places = np.array(given)
-    except ValueError as error:
-        message = f"target_positions: expected a rectangular array of numbers, got {error}"
-        raise InvalidInput(message, "target_positions") from None
-    if places.dtype.kind not in "fiu":
-        message = f"target_positions: expected numbers, got dtype {places.dtype}"
-        raise TypeError(message)
-    places = places.astype(np.float64)
-    count, length = robot.backbone.count, robot.backbone.total_length
-    if places.shape not in ((count, 3), (count + 1, 3)):
-        raise InvalidInput(
-            f"target_positions: expected places of disks 1 to n, shape ({count}, 3), or with the "
-            f"base, shape ({count + 1}, 3), got shape {places.shape}",
-            "target_positions",
+def _gap(shape: Shape, obstacles: tuple[Obstacle, ...], body: float) -> tuple[float, str]:
+    """Least signed distance of a shape's points that may touch [m], and where it is."""
+    least, where = np.inf, ""
+    centres = shape.positions
+    points = [("the centre of disk", centres[1:], body)]
+    for name, own in zip(shape.robot.tendon_names, shape.tendon_points, strict=True):
+        points.append((f"the hole of '{name}' in disk", own[1:], 0.0))
+        points.append(
+            (f"opposite the hole of '{name}' in disk", (2 * centres[: len(own)] - own)[1:], 0.0)
         )
-    if len(places) > count:
-        base = robot.base[:3, 3]
-        if not np.linalg.norm(places[0] - base) <= 1e-9 * length:
-            raise InvalidInput(
-                f"target_positions[0]: expected the robot's base {base.tolist()} [m], "
-                f"got {places[0].tolist()}",
-                "target_positions[0]",
-            )
-        places = places[1:].copy()
-    places.flags.writeable = False
-    return places
+    for what, own, radius in points:
+        gaps = clearance(obstacles, own) - radius
+        disk = int(gaps.argmin())
+        if gaps[disk] < least:
+            least, where = float(gaps[disk]), f"{what} {disk + 1}"
+    return least, where

@@ -22,6 +22,17 @@ def trunk(azimuths=(0.1, 2.0), radii=(0.01, 0.01), rest=None, **keywords):
     return tdcr.Robot(backbone, tendons, **keywords)
 
 
+def elastic(stiffness=(900.0, 1500.0)):
+    """Return a wire with tendons that stretch, one winding, and of other materials."""
+    backbone = tdcr.Backbone(0.2, 8, youngs_modulus=60e9, diameter=0.001)
+    one, other = stiffness
+    tendons = [
+        tdcr.Tendon(0.1, 0.01, stiffness=one),
+        tdcr.Tendon.helical(2.0, 0.01, turns=0.3, end=6, stiffness=other),
+    ]
+    return tdcr.Robot(backbone, tendons)
+
+
 def winding(poisson_ratio=0.3, base=None):
     backbone = tdcr.Backbone(0.2, 8, poisson_ratio=poisson_ratio)
     return tdcr.Robot(backbone, [tdcr.Tendon.helical(0.0, 0.01, turns=0.6)], base=base)
@@ -145,6 +156,32 @@ def test_what_the_data_do_not_tell_has_no_error():
     assert answer.rms() < 2 * NOISE
 
 
+def test_the_stiffness_of_tendons_is_found():
+    known = {"stiffness": np.array([700.0, 2500.0]), "gain": np.array([0.95, 1.04])}
+    start = elastic()
+    given = pulls(start, 7)
+    points = positions(elastic(known["stiffness"]), given * known["gain"])
+    answer = calibrated(start, points, known, given)
+    assert (answer.standard_errors["stiffness"] < 0.1 * known["stiffness"]).all()
+    assert answer.robot.tendons[1].stiffness == answer.parameters["stiffness"][1]
+    with pytest.raises(tdcr.InvalidInput, match=r"tendons with a stiffness .*got tendons\[0\]"):
+        design.fit(trunk(), TIPS, ["stiffness"], displacements=GIVEN)
+
+
+def test_derivatives_by_the_stiffness_of_tendons():
+    problem = Problem(elastic(), ["stiffness", "offset"], "rod", None)
+    given = np.array([[-0.004, -0.003], [-0.006, np.inf], [0.001, -0.006]])
+    measured = Measured(given, np.zeros((3, 9, 3)), np.arange(3), 0)
+    values = problem.start()
+    jacobian = problem.jacobian(values, measured)
+    for p in range(problem.size):
+        step = np.zeros(problem.size)
+        step[p] = 1e-5 / problem.scales[p]
+        behind, ahead = (problem.residuals(values + s, measured)[0] for s in (step, -step))
+        slope = (ahead - behind) / (2 * step[p])
+        assert jacobian[p] == pytest.approx(slope, rel=1e-5, abs=1e-6 * problem.scales[p]), p
+
+
 @pytest.mark.parametrize("points", [1, 9])
 def test_derivatives_are_those_of_the_predictions(points):
     turn = np.array([[0, 0, 1, 0.1], [1, 0, 0, 0.2], [0, 1, 0, 0.3], [0, 0, 0, 1.0]])
@@ -215,6 +252,7 @@ BAD = [
     ("parameters", {"parameters": ["gain", "gain"]}),
     ("parameters", {"parameters": ["stiffness"]}),
     ("parameters", {"parameters": ["rest"], "model": "constant_curvature"}),
+    ("parameters", {"parameters": ["stiffness"], "model": "constant_curvature"}),
     ("model", {"model": "linkage"}),
     ("validation", {"validation": 1.0}),
     ("validation", {"validation": np.nan}),
@@ -246,8 +284,12 @@ def test_the_measured_robot_is_fitted_as_the_guide_says():
     example = runpy.run_path(str(root / "examples" / "fit_measured_robot.py"))
     fits = [example["fitted"](names).require() for names in example["CHOICES"]]
     page = (root / "docs/design.md").read_text(encoding="utf-8")
-    for line in example["table"](fits):
+    rods = [example["fitted"](names).require() for names in example["ROD_CHOICES"]]
+    for line in [*example["table"](fits), *example["table"](rods)]:
         assert line in page
+    # The rod, whose tendons stretch, knows what constant curvature does not.
+    assert rods[-1].mean() < 0.6 * fits[-1].mean()
+    assert rods[-1].failed == rods[-1].dropped == 0
     # Held-out rows are met as well as the others.
     assert fits[-1].mean() < 1.1 * fits[-1].mean("train")
     assert fits[-1].mean() < 0.6 * fits[-1].mean(before=True)

@@ -148,6 +148,70 @@ fn other_settings_are_met_by_descent() {
     }
 }
 
+/// Length of a tendon's piece at a distance `to` on the inner side of a planar bend: chord of the backbone, less
+/// what the disks, half the bend off it, take on both sides.
+fn piece(kind: Subsegment, length: f64, to: f64, bend: f64) -> f64 {
+    let half = 0.5 * bend;
+    let chord = match kind {
+        Subsegment::Link => length,
+        Subsegment::Arc => length * if half == 0.0 { 1.0 } else { half.sin() / half },
+    };
+    chord - 2.0 * to * half.sin()
+}
+
+/// In the plane, a proportional tendon alone says what every subsegment bends to, energy or not: its piece is
+/// `1 + d / Σ l_rest` times as long as at rest. So the rest bends of wanted ones have a closed form: the rest lengths
+/// sum up to `Σ l - d`, and each is its share of that.
+#[test]
+fn planar_proportional_designs_have_the_closed_form() {
+    let (radius, ell, n) = (8e-3, 0.02, 9);
+    for (kind, azimuth, pull) in [
+        (Subsegment::Link, PI, -0.004),
+        (Subsegment::Link, 0.0, -0.006),
+        (Subsegment::Arc, PI, -0.004),
+        (Subsegment::Arc, 0.0, -0.006),
+    ] {
+        let side = if azimuth == 0.0 { radius } else { -radius };
+        let wanted: Vec<f64> = (0..n).map(|i| 0.12 + 0.03 * f64::from(i).sin()).collect();
+        let bent = |bends: &[f64]| {
+            let mut spec = BackboneSpec::straight(ell * f64::from(n), usize::try_from(n).unwrap());
+            spec.rest = Some(bends.iter().map(|bend| Vector3::new(0.0, *bend, 0.0)).collect());
+            let tendon = Tendon::straight(azimuth, radius).unwrap();
+            Robot::new(Backbone::new(spec).unwrap(), vec![tendon], None, None, None).unwrap()
+        };
+        // Where disks are when the wanted bends are at rest.
+        let free = RodSettings { subsegment: kind, ..Default::default() };
+        let final_robot = bent(&wanted);
+        let plan = Plan::new(&final_robot, free).unwrap();
+        let shape = Rod::new(&final_robot, &plan).shape(&[f64::INFINITY]).unwrap();
+        let targets: Vec<_> = shape.state.frames[1..].iter().map(|f| f.translation).collect();
+
+        let lengths: Vec<f64> = wanted.iter().map(|bend| piece(kind, ell, side, *bend)).collect();
+        let ratio = 1.0 + pull / (lengths.iter().sum::<f64>() - pull);
+        let closed = lengths.iter().map(|length| {
+            let off = |bend: f64| piece(kind, ell, side, bend) - length / ratio;
+            // Monotone near straight: the tendon's side is shorter the more it bends that way.
+            let (mut low, mut high) = (-0.6_f64, 0.6_f64);
+            for _ in 0..200 {
+                let middle = 0.5 * (low + high);
+                if (off(middle) > 0.0) == (off(low) > 0.0) { low = middle } else { high = middle }
+            }
+            0.5 * (low + high)
+        });
+        let closed: Vec<f64> = closed.collect();
+
+        let rod = RodSettings { tendons: TendonRule::Proportional, ..free };
+        let settings = PrebendSettings { rod, ..Default::default() };
+        let answer = prebend(&bent(&[0.0; 9]), &targets, &[pull], &settings).unwrap();
+        assert_eq!(answer.status, Status::Converged, "{}", answer.message);
+        for (i, closed) in closed.iter().enumerate() {
+            let own = answer.robot.backbone().rest(i);
+            assert!((own.y - closed).abs() < 1e-7, "{kind:?} {i}: {} {closed}", own.y);
+            assert!(own.x.abs() < 1e-7 && own.z.abs() < 1e-7);
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_reached_is_said() {
     let (robot, _) = finger(0.064);

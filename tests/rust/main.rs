@@ -18,6 +18,7 @@ mod contact_invariances;
 mod contact_loads;
 mod contact_scenes;
 mod design_prebend;
+mod design_routing;
 mod inverse;
 mod inverse_bounds;
 mod inverse_common;

@@ -50,7 +50,7 @@ fn numbers(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 }
 
 /// A pair of bounds.
-fn range(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Range> {
+pub(crate) fn range(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Range> {
     let wrong = || {
         let got = type_name(value);
         PyTypeError::new_err(format!("{argument}: expected a pair (lower, upper), got {got}"))

@@ -26,6 +26,7 @@ mod pso;
 mod pso_settings;
 mod robot;
 mod rod;
+mod routing;
 mod sensitivity;
 mod settings;
 mod shape;
@@ -80,6 +81,8 @@ mod _core {
     use crate::robot::Robot;
     #[pymodule_export]
     use crate::rod::{_chained_shape, RodSettings};
+    #[pymodule_export]
+    use crate::routing::{_routing, _routing_batch, RoutingSettings};
     #[pymodule_export]
     use crate::sensitivity::{Sensitivity, jacobian, sensitivity};
     #[pymodule_export]

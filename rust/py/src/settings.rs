@@ -5,7 +5,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use tdcr::InvalidInput;
 use tdcr::constant_curvature as cc;
-use tdcr::design::PrebendSettings;
+use tdcr::design::{PrebendSettings, RoutingSettings};
 use tdcr::inverse;
 use tdcr::linkage;
 use tdcr::rod::RodSettings;
@@ -16,6 +16,7 @@ use crate::convert::{called, invalid, one_or_tuple};
 use crate::design;
 use crate::pso_settings::{self, PsoSettings as PyPsoSettings};
 use crate::rod;
+use crate::routing;
 
 /// How precisely and how long the linkage model solves each subsegment.
 ///
@@ -368,6 +369,7 @@ pub(crate) fn _rust_defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     defaults.set_item("InverseSettings", inverse.__getnewargs_ex__(py)?.1)?;
     defaults.set_item("RodSettings", rod::keywords(py, &RodSettings::default())?)?;
     defaults.set_item("PrebendSettings", design::keywords(py, &PrebendSettings::default())?)?;
+    defaults.set_item("RoutingSettings", routing::keywords(py, &RoutingSettings::default())?)?;
     defaults.set_item("PsoSettings", pso_settings::keywords(py, &PsoSettings::default())?)?;
     Ok(defaults)
 }

@@ -6,17 +6,20 @@ use super::curve::{mirrored, piece_length};
 use crate::robot::Robot;
 use crate::rod::Subsegment;
 
-/// What a chord may be off, in shares of its subsegment, before it is blamed.
-const OFF: f64 = 1e-9;
-
-/// The first subsegment whose ends the places do not give it, as the end of a message; empty if there is none.
-pub(super) fn hindrance(robot: &Robot, targets: &[Vector3<f64>], kind: Subsegment) -> String {
+/// The first subsegment whose ends the places do not give it, by more than a share `off` of its length, as the
+/// end of a message; empty if there is none.
+pub(super) fn hindrance(
+    robot: &Robot,
+    targets: &[Vector3<f64>],
+    kind: Subsegment,
+    off: f64,
+) -> String {
     let base = robot.base();
     let (mut place, mut tangent) = (base.translation, base.rotation.column(2).into_owned());
     for (i, (target, length)) in targets.iter().zip(robot.backbone().lengths()).enumerate() {
         let chord = target - place;
         let piece = piece_length(kind, &tangent, &chord);
-        if (piece / length - 1.0).abs() > OFF {
+        if (piece / length - 1.0).abs() > off {
             let angle = tangent.cross(&chord).norm().atan2(tangent.dot(&chord)).to_degrees();
             let (next, size) = (i + 1, chord.norm());
             let axis = if i == 0 { "the base's z axis" } else { "the tangent there" };

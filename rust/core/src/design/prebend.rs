@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::check_targets;
 use super::hindrance::hindrance;
 use super::march::march;
 use crate::error::InvalidInput;
@@ -14,6 +15,9 @@ use crate::robot::{Backbone, Robot};
 use crate::rod::{Plan, Rod, RodSettings, TendonRule, Workspace};
 use crate::shape::Shape;
 use crate::status::Status;
+
+/// What a chord may be off, in shares of its subsegment, before it is blamed.
+const OFF: f64 = 1e-9;
 
 /// Choices of a pre-bent design.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,15 +128,7 @@ pub fn prebend_stopped_by(
 ) -> Result<Prebend, InvalidInput> {
     settings.validate()?;
     robot.check_displacements(displacements)?;
-    let n = robot.backbone().subsegments();
-    if targets.len() != n {
-        let expected = format!("{n} places, one per disk from disk 1");
-        return Err(InvalidInput::new("target_positions", expected, targets.len()));
-    }
-    if let Some(i) = targets.iter().position(|t| !t.iter().all(|x| x.is_finite())) {
-        let got = format!("{:?} at disk {}", targets[i].as_slice(), i + 1);
-        return Err(InvalidInput::new("target_positions", "finite places [m]", got));
-    }
+    check_targets(robot, targets)?;
     let design = Design { robot, targets, displacements, settings, stop };
     let start = match design.marched()? {
         Some(candidate) if design.met(&candidate) && settings.smoothness == 0.0 => {
@@ -346,7 +342,7 @@ impl Design<'_> {
             (Status::Converged, String::new())
         } else {
             let disk = errors.iter().position(|e| *e == worst).unwrap_or(0);
-            let why = hindrance(self.robot, self.targets, self.settings.rod.subsegment);
+            let why = hindrance(self.robot, self.targets, self.settings.rod.subsegment, OFF);
             let text = format!("disk {disk} stays {worst:.3e} m from its place{why}");
             (Status::Unreachable, text)
         };

@@ -102,6 +102,15 @@ impl Robot {
         Ok(Self { base: self.base, tool: self.tool, ..new })
     }
 
+    /// The same robot with other tendons.
+    ///
+    /// # Errors
+    /// As [`Robot::new`], where they do not fit it.
+    pub fn with_tendons(&self, tendons: Vec<Tendon>) -> Result<Self, InvalidInput> {
+        let new = Self::new(self.backbone.clone(), tendons, None, None, self.name.clone())?;
+        Ok(Self { base: self.base, tool: self.tool, ..new })
+    }
+
     /// Its backbone.
     #[must_use]
     pub fn backbone(&self) -> &Backbone {

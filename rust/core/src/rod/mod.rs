@@ -12,6 +12,7 @@ mod plan;
 mod proportional;
 mod sensitivity;
 mod settings;
+pub(crate) mod stage;
 mod subsegment;
 
 pub use model::{Rod, Workspace};

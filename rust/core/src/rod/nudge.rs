@@ -20,6 +20,8 @@ const BLIND: f64 = 1e-4;
 const RING: f64 = 1e-6;
 /// No strain starts further from rest \[rad\].
 const FURTHEST: f64 = 1.4;
+/// Where one starts that knows no displacement \[rad\].
+const ASIDE: f64 = 0.5;
 
 /// Buffers of one subsegment with one piece.
 struct Bench {
@@ -117,6 +119,18 @@ fn nudge(plan: &Plan, chain: &mut Chain) -> bool {
         chain.tensions[k] = if lever > 0.0 { (work / lever).max(0.0) } else { 0.0 };
     }
     true
+}
+
+/// Bends a chain at rest to one side where a tendon has no leverage; false if that is nowhere.
+pub(super) fn aside(plan: &Plan, chain: &mut Chain) -> bool {
+    let mut bench = Bench::new(plan.width());
+    let blind: Vec<Blind> =
+        (0..chain.bounds.len()).flat_map(|k| find(plan, k, &mut bench)).collect();
+    for own in &blind {
+        let longest = own.direction.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        bend(plan, own, ASIDE / longest, chain);
+    }
+    !blind.is_empty()
 }
 
 /// Pieces of a tendon without leverage at rest that bending or turning shortens all the same.

@@ -8,7 +8,7 @@ use crate::robot::{Robot, Tendon};
 /// A robot prepared for the rod model.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    pub(super) settings: RodSettings,
+    pub(crate) settings: RodSettings,
     pub(super) data: Vec<Data>,
     /// Pieces of all subsegments, base first.
     pub(super) pieces: Vec<Piece>,
@@ -27,7 +27,7 @@ pub struct Plan {
     /// One plan per subsegment, whose tendons are its pieces, where displacements are proportional.
     pub(super) parts: Vec<Plan>,
     /// Tension \[N, or 1/m²·EI\] of one unit here.
-    pub(super) unit: f64,
+    pub(crate) unit: f64,
 }
 
 impl Plan {
@@ -106,7 +106,7 @@ impl Plan {
     }
 
     /// Length of every piece at rest through these elements: links cut corners that arcs round.
-    fn lengths_at_rest(&self) -> Vec<f64> {
+    pub(super) fn lengths_at_rest(&self) -> Vec<f64> {
         let mut lengths = Vec::with_capacity(self.pieces.len());
         let mut local = Local::default();
         for (i, data) in self.data.iter().enumerate() {
@@ -120,7 +120,7 @@ impl Plan {
     }
 
     /// One subsegment with its pieces as tendons of their own.
-    fn part(&self, i: usize) -> Self {
+    pub(super) fn part(&self, i: usize) -> Self {
         let range = self.starts[i]..self.starts[i + 1];
         let pieces = &self.pieces[range.clone()];
         let rest_lengths = self.piece_lengths[range].to_vec();
@@ -147,6 +147,11 @@ impl Plan {
     /// Rest length of a subsegment \[m\].
     pub(super) fn length(&self, i: usize) -> f64 {
         self.data[i].length * self.settings.elements as f64
+    }
+
+    /// Moment that bends a subsegment by 1 rad, in this plan's unit \[m per unit of tension\].
+    pub(crate) fn stiffness(&self, i: usize) -> f64 {
+        self.data[i].stiffness[0] / self.settings.elements as f64
     }
 
     /// Rest length from base to tip \[m\].

@@ -1,0 +1,182 @@
+//! Routing design: the holes and pulls that bring a given backbone nearest to a wanted shape. The mathematics is
+//! in `docs/design.md`.
+
+mod beam;
+mod design;
+mod polish;
+mod relax;
+mod search;
+mod settings;
+mod starts;
+mod sums;
+mod table;
+mod task;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nalgebra::Vector3;
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use self::design::Design;
+use self::task::Task;
+use crate::batch::Control;
+use crate::error::InvalidInput;
+use crate::inverse::Range;
+use crate::robot::{Path, Robot};
+use crate::rod::Plan;
+use crate::shape::Shape;
+use crate::status::Status;
+
+pub use settings::RoutingSettings;
+
+/// What is known about the nearest routing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Optimality {
+    /// Every disk is in its place: nothing is nearer.
+    Reached,
+    /// Every routing was tried.
+    Exhaustive,
+    /// The best that a search met.
+    Searched,
+}
+
+impl Optimality {
+    /// The name used in Python.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Reached => "reached",
+            Self::Exhaustive => "exhaustive",
+            Self::Searched => "searched",
+        }
+    }
+}
+
+/// A robot whose tendons were routed for a shape.
+#[derive(Clone, Debug)]
+pub struct Routed {
+    /// The robot with its new tendons.
+    pub robot: Robot,
+    /// Its shape under the displacements, from rest.
+    pub shape: Shape,
+    /// Displacements \[m\].
+    pub displacements: Vec<f64>,
+    /// Numbers of each tendon's holes, disk 0 to its end; none where any azimuth was allowed.
+    pub holes: Option<Vec<Vec<usize>>>,
+    /// Distance of each disk from its wanted place, disk 0 first \[m\].
+    pub errors: Vec<f64>,
+    /// Root mean square distance of disks 1 to n \[m\].
+    pub rms: f64,
+    /// The same of the nearest routing with any azimuth that a descent from this one led to \[m\].
+    pub relaxed_rms: f64,
+    /// What is known about there being a nearer one.
+    pub optimality: Optimality,
+    /// Steps of descents and rounds of the search.
+    pub iterations: usize,
+    /// Equilibria of subsegments that the search solved.
+    pub evaluations: usize,
+    /// Converged: every disk is in its place; unreachable: the nearest routing that was found.
+    pub status: Status,
+    /// What stood in the way, or empty.
+    pub message: String,
+}
+
+/// The holes and displacements under which the disks 1 to n of a robot are nearest to `targets` (in the world
+/// \[m\]): least sum of squared distances. Backbone, ends, stiffness and names of the tendons are the robot's, and
+/// their radii unless the settings bound them; displacements stay within `bounds` \[m\]. A routed robot and its tensions
+/// may be what is looked at first.
+///
+/// # Errors
+/// `InvalidInput` for another number of targets than subsegments, places that are not finite, a robot without
+/// tendons or holes in a disk's centre, a start with other tendons, and bounds or settings that do not fit the robot.
+pub fn routing(
+    robot: &Robot,
+    targets: &[Vector3<f64>],
+    bounds: Option<&Range>,
+    start: Option<(&Robot, &[f64])>,
+    settings: &RoutingSettings,
+) -> Result<Routed, InvalidInput> {
+    routing_stopped_by(robot, targets, bounds, start, settings, &Arc::default())
+}
+
+/// The same, which ends soon after the flag is set, with the status of an iteration limit.
+///
+/// # Errors
+/// As [`routing`].
+pub fn routing_stopped_by(
+    robot: &Robot,
+    targets: &[Vector3<f64>],
+    bounds: Option<&Range>,
+    start: Option<(&Robot, &[f64])>,
+    settings: &RoutingSettings,
+    stop: &Arc<AtomicBool>,
+) -> Result<Routed, InvalidInput> {
+    settings.validate()?;
+    check(robot, targets, bounds, start)?;
+    let plan = Plan::new(robot, settings.rod)?;
+    let paths = robot.paths().iter();
+    let radii = paths.map(|path| path.holes.iter().map(Vector3::norm).collect()).collect();
+    let task = Task { robot, targets, bounds, settings, stop, plan, radii };
+    Design::new(&task, start).run()
+}
+
+fn check(
+    robot: &Robot,
+    targets: &[Vector3<f64>],
+    bounds: Option<&Range>,
+    start: Option<(&Robot, &[f64])>,
+) -> Result<(), InvalidInput> {
+    let (n, tendons) = (robot.backbone().subsegments(), robot.tendons().len());
+    if tendons == 0 {
+        return Err(InvalidInput::new("robot", "at least one tendon to route", "none"));
+    }
+    super::check_targets(robot, targets)?;
+    if let Some(bounds) = bounds {
+        let (lower, upper) = bounds.values();
+        for count in [lower.len(), upper.len()] {
+            if count != 1 && count != tendons {
+                let expected = format!("one bound for all or {tendons}, one per tendon");
+                return Err(InvalidInput::new("bounds", expected, count));
+            }
+        }
+    }
+    if let Some((routed, tensions)) = start {
+        let ends = |robot: &Robot| robot.paths().iter().map(Path::end).collect::<Vec<_>>();
+        if routed.backbone().subsegments() != n || ends(routed) != ends(robot) {
+            let expected =
+                format!("a routing of {n} subsegments with tendons that end at {:?}", ends(robot));
+            let got = format!("{} and {:?}", routed.backbone().subsegments(), ends(routed));
+            return Err(InvalidInput::new("start", expected, got));
+        }
+        if tensions.len() != tendons || !tensions.iter().all(|t| t.is_finite() && *t >= 0.0) {
+            let expected = format!("{tendons} tensions of 0 or more");
+            return Err(InvalidInput::new("start", expected, format!("{tensions:?}")));
+        }
+    }
+    Ok(())
+}
+
+/// Rows of wanted places, each as alone, on a pool; nothing when it was stopped.
+///
+/// # Errors
+/// As [`routing`], of the first row that has one.
+pub fn routing_rows(
+    robot: &Robot,
+    rows: &[Vec<Vector3<f64>>],
+    bounds: Option<&Range>,
+    settings: &RoutingSettings,
+    pool: &ThreadPool,
+    control: &Control,
+) -> Result<Option<Vec<Routed>>, InvalidInput> {
+    let stop = &control.stop;
+    let row = |targets: &Vec<Vector3<f64>>| {
+        let answer = routing_stopped_by(robot, targets, bounds, None, settings, stop);
+        control.done.fetch_add(1, Ordering::Relaxed);
+        answer
+    };
+    let answers: Vec<_> = pool.install(|| rows.par_iter().map(row).collect());
+    let answers = answers.into_iter().collect::<Result<_, _>>()?;
+    Ok((!stop.load(Ordering::Relaxed)).then_some(answers))
+}

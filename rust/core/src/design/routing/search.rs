@@ -1,0 +1,239 @@
+//! Which holes: beams over tensions, and around what is best so far.
+
+use std::collections::BTreeMap;
+
+use super::beam::{Leaf, Window, search};
+use super::polish::{Candidate, Follower};
+use super::table::{Choice, Field};
+use super::task::{Holes, Task};
+use crate::error::InvalidInput;
+
+/// Whether what a search has found is enough.
+pub(super) type Enough<'e, 't, 'a> = dyn FnMut(&Search<'t, 'a>) -> Result<bool, InvalidInput> + 'e;
+
+/// Tensions of one tendon that are tried, as multiples of what the wanted bends ask for where all of it pulls on
+/// one side: from a share of their mean on, each so much more than the one before, up to a multiple of the largest,
+/// and to a load that no straight subsegment bears.
+const FROM: f64 = 0.3;
+const RATIO: f64 = 1.15;
+const TO: f64 = 8.0;
+const LOAD: f64 = 24.0;
+/// Leaves of a beam whose tensions are polished.
+const POLISHED: usize = 12;
+/// How far from its tensions a round looks, in shares of them, and how much nearer its answer must be to go on.
+const NEAR: f64 = 0.03;
+const WIDE: f64 = 0.3;
+const NEARER: f64 = 1.0 - 1e-6;
+/// Tendons whose neighbouring holes are searched all at once, at most: three each make 27 choices per disk.
+const JOINT: usize = 3;
+
+/// What was found so far.
+pub(super) struct Search<'t, 'a> {
+    task: &'t Task<'a>,
+    /// Holes per disk.
+    pub(super) count: usize,
+    follower: Follower,
+    /// Every routing whose tensions were polished.
+    known: BTreeMap<Holes, Candidate>,
+    solved: usize,
+    /// Rounds of beams.
+    pub(super) rounds: usize,
+    /// No routing was left out over all tensions.
+    pub(super) whole: bool,
+}
+
+impl<'t, 'a> Search<'t, 'a> {
+    pub(super) fn new(task: &'t Task<'a>, count: usize) -> Self {
+        Self {
+            task,
+            count,
+            follower: Follower::new(task),
+            known: BTreeMap::new(),
+            solved: 0,
+            rounds: 0,
+            whole: false,
+        }
+    }
+
+    /// Equilibria of subsegments.
+    pub(super) fn solved(&self) -> usize {
+        self.solved + self.follower.solved()
+    }
+
+    /// Steps on tensions and rounds.
+    pub(super) fn steps(&self) -> usize {
+        self.follower.steps + self.rounds
+    }
+
+    /// What was found, nearest first.
+    pub(super) fn found(&self) -> Vec<&Candidate> {
+        let mut all: Vec<_> = self.known.values().collect();
+        all.sort_by(|a, b| a.value.total_cmp(&b.value).then_with(|| a.holes.cmp(&b.holes)));
+        all
+    }
+
+    pub(super) fn best(&self) -> Option<&Candidate> {
+        self.found().first().copied()
+    }
+
+    /// Polishes the tensions of a routing and keeps it; whether it is the best.
+    pub(super) fn try_holes(&mut self, holes: &Holes, tensions: &[f64]) -> bool {
+        let least = self.best().map_or(f64::INFINITY, |best| best.value);
+        let polished = self.follower.polish(self.task, holes, self.count, tensions);
+        let Some(candidate) = polished else { return false };
+        let better = candidate.value < NEARER * least;
+        let known = self.known.get(holes).is_some_and(|known| known.value <= candidate.value);
+        if !known {
+            self.known.insert(holes.clone(), candidate);
+        }
+        better
+    }
+
+    /// Polishes the nearest leaves, all of them where none was left out; whether one of them is the best.
+    fn keep(&mut self, (leaves, whole): (Vec<Leaf>, bool)) -> bool {
+        self.rounds += 1;
+        let most = if whole { leaves.len() } else { POLISHED };
+        let mut better = false;
+        for leaf in leaves.into_iter().take(most) {
+            let known = self.known.get(&leaf.holes).map_or(f64::INFINITY, |known| known.value);
+            if leaf.value < 0.5 * known && !self.task.stopped() {
+                better |= self.try_holes(&leaf.holes, &leaf.tensions);
+            }
+        }
+        better
+    }
+
+    /// What all disks may have: `own` of every tendon that comes by.
+    fn choices(&self, own: impl Fn(usize, usize) -> Vec<usize>) -> Vec<Vec<Choice>> {
+        let tendons = self.task.tendons();
+        let disk = |i: usize| {
+            let mut all: Vec<Choice> = vec![Vec::new()];
+            for k in 0..tendons {
+                let may = if i <= self.task.end(k) { own(i, k) } else { vec![0] };
+                let longer = all.iter().flat_map(|begun| {
+                    may.iter().map(move |hole| begun.iter().copied().chain([*hole]).collect())
+                });
+                all = longer.collect();
+            }
+            all
+        };
+        (0..self.task.disks()).map(disk).collect()
+    }
+
+    /// One round among choices, at tensions and within a share of them.
+    fn round(&mut self, choices: Vec<Vec<Choice>>, tensions: &[f64], share: f64) -> bool {
+        let mut field = Field::new(self.task, choices, self.count);
+        let width: Vec<f64> = tensions.iter().map(|t| share * t).collect();
+        let found = if field.fill(self.task, tensions) {
+            search(self.task, &field, &Window { tensions, width: &width })
+        } else {
+            None
+        };
+        self.solved += field.solved();
+        found.is_some_and(|found| self.keep(found))
+    }
+
+    /// One tendon: all holes, over all tensions that the wanted bends may ask for. Ends early where `enough` says so.
+    pub(super) fn over_tensions(
+        &mut self,
+        enough: &mut Enough<'_, 't, 'a>,
+    ) -> Result<bool, InvalidInput> {
+        let task = self.task;
+        let bends = task.bends();
+        let asked: Vec<f64> =
+            bends.iter().enumerate().map(|(i, (_, angle))| task.tension_for(i, *angle)).collect();
+        let mean = (asked.iter().map(|t| t * t).sum::<f64>() / asked.len() as f64).sqrt();
+        let largest = asked.iter().fold(0.0_f64, |most, t| most.max(*t));
+        let last = (TO * largest).min(LOAD / task.plan.slenderness);
+        let mut tension = (FROM * mean).min(last);
+        let all = self.choices(|_, _| (0..self.count).collect());
+        let mut field = Field::new(task, all.clone(), self.count);
+        let (mut whole, mut done) = (true, false);
+        loop {
+            let width = [tension * (RATIO - 1.0)];
+            let window = Window { tensions: &[tension], width: &width };
+            let filled = field.fill(task, &[tension]);
+            let Some(found) = filled.then(|| search(task, &field, &window)).flatten() else {
+                break;
+            };
+            whole &= found.1;
+            if self.keep(found) && enough(self)? {
+                done = true;
+                break;
+            }
+            if tension >= last {
+                self.whole = whole;
+                break;
+            }
+            tension = (tension * RATIO).min(last);
+        }
+        self.solved += field.solved();
+        // Once more where the best ones are: their neighbours at their own tension.
+        while let Some(best) = self.best().filter(|_| !done && !task.stopped()) {
+            let tensions = best.tensions.clone();
+            if !self.round(all.clone(), &tensions, NEAR) {
+                break;
+            }
+            done = enough(self)?;
+        }
+        Ok(done)
+    }
+
+    /// Several tendons, from a routing: rounds over each one's holes, and over neighbouring holes of all at once,
+    /// until none of them brings it nearer.
+    pub(super) fn around(
+        &mut self,
+        start: &Holes,
+        tensions: &[f64],
+        enough: &mut Enough<'_, 't, 'a>,
+    ) -> Result<bool, InvalidInput> {
+        let (task, count) = (self.task, self.count);
+        let first = self.follower.polish(task, start, count, tensions);
+        let Some(mut here) = first else { return Ok(false) };
+        self.known.entry(start.clone()).or_insert_with(|| here.clone());
+        let joint = task.tendons() <= JOINT;
+        for _ in 0..task.settings.max_iterations {
+            let before = here.value;
+            for k in (0..task.tendons() + usize::from(joint)).rev() {
+                if task.stopped() {
+                    return Ok(false);
+                }
+                let holes = here.holes.clone();
+                let choices = self.choices(|disk, tendon| {
+                    let own = holes[disk][tendon];
+                    if k == task.tendons() {
+                        let mut near = vec![own, (own + 1) % count, (own + count - 1) % count];
+                        near.sort_unstable();
+                        near.dedup();
+                        near
+                    } else if k == tendon {
+                        (0..count).collect()
+                    } else {
+                        vec![own]
+                    }
+                });
+                // What is known elsewhere is no neighbour of what is here: the round's own best counts.
+                let known = std::mem::take(&mut self.known);
+                self.round(choices, &here.tensions, WIDE);
+                let best = self.best().cloned();
+                let found = std::mem::replace(&mut self.known, known);
+                for (holes, candidate) in found {
+                    let known = self.known.get(&holes);
+                    if known.is_none_or(|known| candidate.value < known.value) {
+                        self.known.insert(holes, candidate);
+                    }
+                }
+                if let Some(best) = best.filter(|best| best.value < NEARER * here.value) {
+                    here = best;
+                }
+            }
+            if enough(self)? {
+                return Ok(true);
+            }
+            if here.value >= NEARER * before {
+                break;
+            }
+        }
+        Ok(false)
+    }
+}
