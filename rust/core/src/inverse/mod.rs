@@ -3,9 +3,12 @@
 //! [`ConstantCurvatureInverse`] finds the arcs by descents from many starts ([`crate::solve::fit`]),
 //! inside bounds, and spends what freedom is left on the least bending energy.
 
+mod aim;
 mod bounds;
 mod chain;
 mod constant_curvature;
+mod pull;
+mod rod;
 mod rows;
 mod search;
 mod settings;
@@ -15,6 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 
 pub use bounds::{Bounds, Range};
 pub use constant_curvature::{Answer, ConstantCurvatureInverse, Solution, Workspace};
+pub use rod::{RodInverse, RodWorkspace};
 pub use rows::{InverseRows, invert_path, invert_rows};
 pub use settings::{InverseSettings, Method};
 

@@ -9,10 +9,12 @@ mod message;
 mod model;
 mod nudge;
 mod plan;
+pub(crate) mod pulled;
 mod proportional;
 mod sensitivity;
 mod settings;
 mod subsegment;
+mod sweep;
 
 pub use model::{Rod, Workspace};
 pub use plan::Plan;

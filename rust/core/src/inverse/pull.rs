@@ -1,0 +1,204 @@
+//! The rod before a target: residuals of the tool by the tensions, bounds on displacements, the sum of squared
+//! tensions.
+
+use nalgebra::Vector6;
+
+use crate::rod::pulled::Pulled;
+use crate::solve::fit::Problem;
+use crate::solve::quadratic::Rows;
+
+use super::InverseSettings;
+use super::aim::Aim;
+
+/// Unknowns: tensions in such units that each is about the angle by which it bends the rod alone \[rad\].
+#[derive(Clone, Debug)]
+pub(super) struct Pull<'a> {
+    pub(super) pulled: Pulled<'a>,
+    pub(super) aim: Aim<'a>,
+    /// Tension of a unit of every unknown.
+    units: &'a [f64],
+    /// Lowest and highest displacement of every tendon \[m\].
+    ranges: &'a [(f64, f64)],
+    /// Length of every tendon at rest, which violations are measured by \[m\].
+    lengths: &'a [f64],
+    bounded: bool,
+    tensions: Vec<f64>,
+    /// The point evaluated last is a balance.
+    sound: bool,
+    moved: Vec<f64>,
+    here: Vec<Vector6<f64>>,
+    there: Vec<Vector6<f64>>,
+}
+
+/// Difference of unknowns for second derivatives \[rad\].
+const DIFFERENCE: f64 = 1e-4;
+/// What these leave of a gradient's precision.
+const PRECISION: f64 = 1e-7;
+
+impl<'a> Pull<'a> {
+    pub(super) fn new(
+        pulled: Pulled<'a>,
+        settings: &'a InverseSettings,
+        units: &'a [f64],
+        ranges: &'a [(f64, f64)],
+    ) -> Self {
+        let (robot, lengths) = (pulled.robot(), pulled.rest_lengths());
+        let finite = |(lower, upper): &(f64, f64)| lower.is_finite() || upper.is_finite();
+        Self {
+            pulled,
+            aim: Aim::new(robot, settings),
+            units,
+            ranges,
+            lengths,
+            bounded: ranges.iter().any(finite),
+            tensions: Vec::new(),
+            sound: false,
+            moved: Vec::new(),
+            here: Vec::new(),
+            there: Vec::new(),
+        }
+    }
+
+    /// Goes to the balance under the tensions of a point and places the tool.
+    fn place(&mut self, z: &[f64]) -> bool {
+        self.tensions.clear();
+        // Rounding leaves no tension below zero.
+        self.tensions.extend(z.iter().zip(self.units).map(|(z, unit)| (z * unit).max(0.0)));
+        self.sound = self.pulled.go(&self.tensions);
+        if self.sound {
+            self.pulled.differentiate();
+            let tool = self.pulled.tool;
+            self.aim.place(tool.translation, || tool.rotation);
+        }
+        self.sound
+    }
+
+    /// Bounds on displacements that hold the point evaluated last back: a tendon, and whether its release is.
+    pub(super) fn holding(&self, within: f64) -> Vec<(usize, bool)> {
+        let mut out = Vec::new();
+        for (k, (lower, upper)) in self.ranges.iter().enumerate() {
+            let displacement = self.pulled.displacement(k);
+            if displacement - lower <= within {
+                out.push((k, false));
+            }
+            if upper - displacement <= within {
+                out.push((k, true));
+            }
+        }
+        out
+    }
+}
+
+impl Problem<6> for Pull<'_> {
+    fn evaluate(&mut self, z: &[f64], residual: &mut Vector6<f64>, jacobian: &mut [Vector6<f64>]) {
+        if !self.place(z) {
+            // No balance there: a step is not taken.
+            residual.fill(f64::NAN);
+            return;
+        }
+        *residual = self.aim.residual();
+        self.aim.write_columns(&self.pulled.columns, jacobian);
+        jacobian.iter_mut().zip(self.units).for_each(|(column, unit)| *column *= *unit);
+    }
+
+    fn squared(&mut self, z: &[f64]) -> f64 {
+        if self.place(z) { self.aim.residual().norm_squared() } else { f64::INFINITY }
+    }
+
+    fn met(&self, residual: &Vector6<f64>) -> bool {
+        self.aim.met(residual)
+    }
+
+    fn add_hessian(&mut self, z: &[f64], weights: &Vector6<f64>, hessian: &mut [f64]) {
+        let size = z.len();
+        let mut residual = Vector6::zeros();
+        let (mut here, mut there) =
+            (std::mem::take(&mut self.here), std::mem::take(&mut self.there));
+        let mut moved = std::mem::take(&mut self.moved);
+        here.resize(size, Vector6::zeros());
+        there.resize(size, Vector6::zeros());
+        self.evaluate(z, &mut residual, &mut here);
+        for b in 0..size {
+            moved.clear();
+            moved.extend_from_slice(z);
+            moved[b] += DIFFERENCE;
+            self.evaluate(&moved, &mut residual, &mut there);
+            if !self.sound {
+                continue;
+            }
+            for a in 0..size {
+                let bent = weights.dot(&(there[a] - here[a])) / DIFFERENCE;
+                // The lower triangle of the symmetric part.
+                let share = if a == b { 1.0 } else { 0.5 };
+                hessian[a.max(b) * size + a.min(b)] += share * bent;
+            }
+        }
+        self.evaluate(z, &mut residual, &mut here);
+        (self.here, self.there, self.moved) = (here, there, moved);
+    }
+
+    fn bounded(&self) -> bool {
+        self.bounded
+    }
+
+    fn linearize(&self, rows: &mut Rows) {
+        if !self.sound {
+            return;
+        }
+        let size = self.units.len();
+        for (k, (lower, upper)) in self.ranges.iter().enumerate() {
+            let displacement = self.pulled.displacement(k);
+            for (sign, room) in [(1.0, upper - displacement), (-1.0, displacement - lower)] {
+                if !room.is_finite() {
+                    continue;
+                }
+                let slope = |j| sign * self.pulled.displacement_slope(k, j) * self.units[j];
+                let norm = (0..size).map(|j| slope(j) * slope(j)).sum::<f64>().sqrt();
+                if norm > 0.0 {
+                    let row = rows.push(size, room / norm);
+                    row.iter_mut().enumerate().for_each(|(j, entry)| *entry = slope(j) / norm);
+                }
+            }
+        }
+    }
+
+    fn violation(&self) -> f64 {
+        if !(self.bounded && self.sound) {
+            return 0.0;
+        }
+        let rows = self.ranges.iter().zip(self.lengths).enumerate();
+        rows.fold(0.0, |most, (k, ((lower, upper), length))| {
+            let displacement = self.pulled.displacement(k);
+            most.max((displacement - upper).max(lower - displacement) / length)
+        })
+    }
+
+    fn precision(&self) -> f64 {
+        PRECISION
+    }
+
+    fn energy(&self, z: &[f64], gradient: &mut [f64]) -> f64 {
+        let scale = self.scale();
+        let mut energy = 0.0;
+        for (k, (z, unit)) in z.iter().zip(self.units).enumerate() {
+            let weight = unit * unit / scale;
+            energy += 0.5 * weight * z * z;
+            gradient[k] = weight * z;
+        }
+        energy
+    }
+
+    fn add_energy_hessian(&self, z: &[f64], hessian: &mut [f64]) {
+        let scale = self.scale();
+        for (k, unit) in self.units.iter().enumerate() {
+            hessian[k * (z.len() + 1)] += unit * unit / scale;
+        }
+    }
+}
+
+impl Pull<'_> {
+    /// Mean square of the units: the energy is then of order 1.
+    fn scale(&self) -> f64 {
+        self.units.iter().map(|unit| unit * unit).sum::<f64>() / self.units.len().max(1) as f64
+    }
+}
