@@ -1,6 +1,6 @@
 //! The tool before a target: weighted residuals and their derivatives.
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Matrix3, RowVector3, Vector3, Vector6};
 
 use super::{InverseSettings, Target};
 use crate::lie::{Pose, so3};
@@ -26,11 +26,11 @@ pub(super) struct Aim<'a> {
     /// Place of the tool.
     pub(super) tool: Vector3<f64>,
     /// Rotation of the tool.
-    pub(super) rotation: Matrix3<f64>,
+    rotation: Matrix3<f64>,
     /// Rotation from the tool to the target, tool axes.
-    pub(super) error: Vector3<f64>,
+    error: Vector3<f64>,
     /// From angular velocity (world axes) to the change of `error`, but for the sign.
-    pub(super) back: Matrix3<f64>,
+    back: Matrix3<f64>,
 }
 
 impl<'a> Aim<'a> {
@@ -161,11 +161,45 @@ impl<'a> Aim<'a> {
             && sum(3..6) <= self.settings.rotation_tolerance
     }
 
-    /// What weights of the residuals push the tool by: a force along the base's axes, a twist about the tool's.
-    pub(super) fn push(&self, weights: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    /// Second derivatives of `weights . r`.
+    pub(super) fn curvature(&self, weights: &Vector6<f64>) -> Curvature<'_, 'a> {
         let push = -weights.component_mul(&self.weights);
         let force: Vector3<f64> = push.fixed_rows::<3>(0).into();
         let force = self.axes.map_or(force, |axes| axes.tr_mul(&force));
-        (force, push.fixed_rows::<3>(3).into())
+        let twist: Vector3<f64> = push.fixed_rows::<3>(3).into();
+        let moment =
+            if self.rotates() { self.back.transpose() * twist } else { Vector3::zeros() };
+        Curvature { aim: self, force, moment, twist }
+    }
+}
+
+/// What weights of the residuals push the tool by.
+pub(super) struct Curvature<'t, 'a> {
+    aim: &'t Aim<'a>,
+    /// Along the base's axes.
+    pub(super) force: Vector3<f64>,
+    /// The same, as `back` carries it.
+    pub(super) moment: Vector3<f64>,
+    /// About the tool's axes.
+    twist: Vector3<f64>,
+}
+
+impl Curvature<'_, '_> {
+    /// What is needed of one unknown's spin for [`Self::rotation`].
+    pub(super) fn row(&self, spin: &Vector3<f64>) -> RowVector3<f64> {
+        let turned = self.aim.rotation.transpose() * spin;
+        self.twist.transpose() * so3::left_jacobian_inverse_derivative(&self.aim.error, &turned)
+    }
+
+    /// The part of the rotation, of two unknowns by their spins, the row of the first, and the moment's work on the
+    /// change of the first one's spin by the other.
+    pub(super) fn rotation(
+        &self,
+        row: &RowVector3<f64>,
+        spin: &Vector3<f64>,
+        other: &Vector3<f64>,
+        turned: f64,
+    ) -> f64 {
+        turned - self.moment.dot(&other.cross(spin)) - (row * (self.aim.back * other))[0]
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Vector2, Vector3, Vector6};
 
 use crate::constant_curvature::Plan;
 use crate::constant_curvature::bent::Bent;
-use crate::lie::{Pose, so3};
+use crate::lie::Pose;
 use crate::robot::Robot;
 use crate::solve::fit::Problem;
 
@@ -126,19 +126,13 @@ impl Problem<6> for Chain<'_> {
     fn add_hessian(&mut self, _: &[f64], weights: &Vector6<f64>, hessian: &mut [f64]) {
         let width = self.plan.width();
         let size = self.columns.len();
-        let (force, twist) = self.aim.push(weights);
-        let Aim { rotation: tool, error, back, .. } = &self.aim;
         let rotates = self.aim.rotates();
-        // In world axes, as `back` carries it.
-        let moment = if rotates { back.transpose() * twist } else { Vector3::zeros() };
-        let bends = |spin: &Vector3<f64>| {
-            so3::left_jacobian_inverse_derivative(error, &(tool.transpose() * spin))
-        };
+        let push = self.aim.curvature(weights);
         for i in 0..size / width {
             let own = self.within(i);
             for a in width * i..width * (i + 1) {
                 let (velocity, spin) = &self.columns[a];
-                let row = twist.transpose() * bends(spin);
+                let row = push.row(spin);
                 for b in 0..=a {
                     let other = &self.columns[b].1;
                     // The proximal unknown turns all that the distal one does.
@@ -147,10 +141,9 @@ impl Problem<6> for Chain<'_> {
                     } else {
                         (other.cross(velocity), other.cross(spin))
                     };
-                    let mut sum = force.dot(&moved);
+                    let mut sum = push.force.dot(&moved);
                     if rotates {
-                        sum += moment.dot(&(turned - other.cross(spin)));
-                        sum -= (row * (back * other))[0];
+                        sum += push.rotation(&row, spin, other, push.moment.dot(&turned));
                     }
                     hessian[a * size + b] += sum;
                 }
@@ -189,6 +182,7 @@ mod tests {
 
     use super::super::Target;
     use super::*;
+    use crate::lie::so3;
     use crate::constant_curvature::ConstantCurvatureSettings;
     use crate::robot::{Backbone, BackboneSpec, PerDisk, Routing, Tendon};
 

@@ -26,14 +26,11 @@ pub(super) struct Pull<'a> {
     /// The point evaluated last is a balance.
     sound: bool,
     moved: Vec<f64>,
-    here: Vec<Vector6<f64>>,
-    there: Vec<Vector6<f64>>,
+    turned: Vec<f64>,
 }
 
-/// Difference of unknowns for second derivatives \[rad\].
-const DIFFERENCE: f64 = 1e-4;
-/// What these leave of a gradient's precision.
-const PRECISION: f64 = 1e-7;
+/// Second derivatives that are nearly right lead to a gradient of this precision in few steps.
+const PRECISION: f64 = 1e-6;
 
 impl<'a> Pull<'a> {
     pub(super) fn new(
@@ -54,8 +51,7 @@ impl<'a> Pull<'a> {
             tensions: Vec::new(),
             sound: false,
             moved: Vec::new(),
-            here: Vec::new(),
-            there: Vec::new(),
+            turned: Vec::new(),
         }
     }
 
@@ -111,30 +107,22 @@ impl Problem<6> for Pull<'_> {
 
     fn add_hessian(&mut self, z: &[f64], weights: &Vector6<f64>, hessian: &mut [f64]) {
         let size = z.len();
-        let mut residual = Vector6::zeros();
-        let (mut here, mut there) =
-            (std::mem::take(&mut self.here), std::mem::take(&mut self.there));
-        let mut moved = std::mem::take(&mut self.moved);
-        here.resize(size, Vector6::zeros());
-        there.resize(size, Vector6::zeros());
-        self.evaluate(z, &mut residual, &mut here);
-        for b in 0..size {
-            moved.clear();
-            moved.extend_from_slice(z);
-            moved[b] += DIFFERENCE;
-            self.evaluate(&moved, &mut residual, &mut there);
-            if !self.sound {
-                continue;
-            }
-            for a in 0..size {
-                let bent = weights.dot(&(there[a] - here[a])) / DIFFERENCE;
-                // The lower triangle of the symmetric part.
-                let share = if a == b { 1.0 } else { 0.5 };
-                hessian[a.max(b) * size + a.min(b)] += share * bent;
+        let rotates = self.aim.rotates();
+        let push = self.aim.curvature(weights);
+        let Self { pulled, moved, turned, units, .. } = self;
+        pulled.curve(&push.force, &push.moment, moved, turned);
+        for a in 0..size {
+            let spin = &pulled.columns[a].1;
+            let row = push.row(spin);
+            for b in 0..=a {
+                let mut sum = moved[a * size + b] + moved[b * size + a];
+                if rotates {
+                    let other = &pulled.columns[b].1;
+                    sum += push.rotation(&row, spin, other, turned[a * size + b]);
+                }
+                hessian[a * size + b] += units[a] * units[b] * sum;
             }
         }
-        self.evaluate(z, &mut residual, &mut here);
-        (self.here, self.there, self.moved) = (here, there, moved);
     }
 
     fn bounded(&self) -> bool {

@@ -18,7 +18,7 @@ use crate::robot::Robot;
 use crate::solve::quadratic::dot;
 
 /// Balance that is near enough: its square is below every tolerance \[rad of the own stiffness\].
-const BALANCED: f64 = 1e-7;
+const BALANCED: f64 = 1e-6;
 /// Newton steps to a balance.
 const PATIENCE: usize = 12;
 /// No strain moves further in one step \[rad\].
@@ -56,8 +56,15 @@ pub(crate) struct Pulled<'r> {
     /// The tool in the base's frame.
     pub(crate) tool: Pose,
     /// Velocity of the tool and angular velocity by every tension, in the base's axes.
-    pub(crate) columns: Vec<(Vector3<f64>, Vector3<f64>)>,
+    pub(crate) columns: Vec<Twist>,
+    /// Every piece's share of them.
+    shares: Vec<Twist>,
+    /// Angular velocities of the subsegment's middle that is looked at.
+    spins: Vec<Vector3<f64>>,
 }
+
+/// A velocity and an angular velocity.
+type Twist = (Vector3<f64>, Vector3<f64>);
 
 impl<'r> Pulled<'r> {
     /// At rest.
@@ -70,6 +77,8 @@ impl<'r> Pulled<'r> {
             frames: Vec::new(),
             tool: Pose::identity(),
             columns: Vec::new(),
+            shares: Vec::new(),
+            spins: Vec::new(),
         };
         pulled.rest();
         pulled
@@ -225,26 +234,71 @@ impl<'r> Pulled<'r> {
         self.tool = frame.compose(self.rod.robot.tool());
         self.columns.clear();
         self.columns.resize(chain.tensions.len(), (Vector3::zeros(), Vector3::zeros()));
-        let columns = &mut self.columns;
+        self.shares.clear();
+        let (columns, shares) = (&mut self.columns, &mut self.shares);
         // What balance the strains lack moves the tool by this.
-        let mut lack = (Vector3::zeros(), Vector3::zeros());
+        let mut lack: Twist = (Vector3::zeros(), Vector3::zeros());
         let at =
             Solved { strains: &chain.strains, factors: &chain.factors, frames: &self.frames };
         self.sweep.run::<D>(plan, &at, &self.tool.translation, |i, rows| {
-            let take = |sum: &mut (Vector3<f64>, Vector3<f64>), image: &[f64]| {
-                for k in 0..3 {
-                    sum.0[k] -= dot(&rows[k * size..(k + 1) * size], image);
-                    sum.1[k] -= dot(&rows[(k + 3) * size..(k + 4) * size], image);
-                }
+            let product = |image: &[f64]| {
+                let by = |k: usize| -dot(&rows[k * size..(k + 1) * size], image);
+                (Vector3::new(by(0), by(1), by(2)), Vector3::new(by(3), by(4), by(5)))
             };
             for p in plan.starts[i]..plan.starts[i + 1] {
-                let image = &chain.images[p * size..(p + 1) * size];
-                take(&mut columns[plan.pieces[p].tendon], image);
+                let share = product(&chain.images[p * size..(p + 1) * size]);
+                let sum = &mut columns[plan.pieces[p].tendon];
+                (sum.0, sum.1) = (sum.0 + share.0, sum.1 + share.1);
+                shares.push(share);
             }
-            take(&mut lack, &chain.gradients[i * size..(i + 1) * size]);
+            let share = product(&chain.gradients[i * size..(i + 1) * size]);
+            lack = (lack.0 + share.0, lack.1 + share.1);
         });
         self.tool.translation += lack.0;
         self.tool.rotation = so3::exp(&lack.1) * self.tool.rotation;
+    }
+
+    /// Second derivatives of the tool's place times a force and of its rotation times a moment, by two tensions, into
+    /// two square matrices: `(a, b)` of the first summed with `(b, a)`; of the second, the change of column a by
+    /// tension b. Where the tool was placed last, and as if tensions turned every subsegment by as much as they do
+    /// there: what is left out is that of its strains by the tensions, small unless it is about to buckle.
+    pub(crate) fn curve(
+        &mut self,
+        force: &Vector3<f64>,
+        moment: &Vector3<f64>,
+        moved: &mut Vec<f64>,
+        turned: &mut Vec<f64>,
+    ) {
+        let plan = self.plan();
+        let count = self.columns.len();
+        for matrix in [&mut *moved, &mut *turned] {
+            matrix.clear();
+            matrix.resize(count * count, 0.0);
+        }
+        let Self { shares, spins, .. } = self;
+        spins.clear();
+        spins.resize(count, Vector3::zeros());
+        for i in 0..plan.data.len() {
+            let range = plan.starts[i]..plan.starts[i + 1];
+            let pieces = &plan.pieces[range.clone()];
+            let halve = |spins: &mut [Vector3<f64>]| {
+                for (piece, share) in pieces.iter().zip(&shares[range.clone()]) {
+                    spins[piece.tendon] += share.1 * 0.5;
+                }
+            };
+            // Half a subsegment turns the other half.
+            halve(spins);
+            for (piece, share) in pieces.iter().zip(&shares[range.clone()]) {
+                let (swung, spun) = (share.0.cross(force), share.1.cross(moment));
+                let row = piece.tendon * count..(piece.tendon + 1) * count;
+                let rows = moved[row.clone()].iter_mut().zip(&mut turned[row]);
+                for ((moved, turned), spin) in rows.zip(spins.iter()) {
+                    *moved += spin.dot(&swung);
+                    *turned += spin.dot(&spun);
+                }
+            }
+            halve(spins);
+        }
     }
 
     /// Where nothing was solved yet: by what turns of the subsegments shorten every tendon, linearly \[m\], into
