@@ -243,8 +243,7 @@ fn contradictory_bounds_are_infeasible() {
     // Whatever was solved before, the answer describes its own arcs.
     let mut pulled = vec![0.05; 9];
     pulled[..3].fill(-0.001);
-    let bounds =
-        Bounds { displacement: range(vec![-0.05; 9], pulled), ..Bounds::default() };
+    let bounds = Bounds { displacement: range(vec![-0.05; 9], pulled), ..Bounds::default() };
     let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings).unwrap();
     let mut work = inverse.workspace();
     let first = inverse.solve(&target, None, &mut work);

@@ -167,8 +167,7 @@ impl<'a> Aim<'a> {
         let force: Vector3<f64> = push.fixed_rows::<3>(0).into();
         let force = self.axes.map_or(force, |axes| axes.tr_mul(&force));
         let twist: Vector3<f64> = push.fixed_rows::<3>(3).into();
-        let moment =
-            if self.rotates() { self.back.transpose() * twist } else { Vector3::zeros() };
+        let moment = if self.rotates() { self.back.transpose() * twist } else { Vector3::zeros() };
         Curvature { aim: self, force, moment, twist }
     }
 }

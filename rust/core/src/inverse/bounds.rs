@@ -55,7 +55,12 @@ impl Range {
         (&self.lower, &self.upper)
     }
 
-    pub(super) fn check(&self, argument: &str, count: usize, per: &str) -> Result<(), InvalidInput> {
+    pub(super) fn check(
+        &self,
+        argument: &str,
+        count: usize,
+        per: &str,
+    ) -> Result<(), InvalidInput> {
         for length in [self.lower.len(), self.upper.len()] {
             if length != 1 && length != count {
                 let expected = format!("1 or {count} values, one per {per}");

@@ -182,8 +182,8 @@ mod tests {
 
     use super::super::Target;
     use super::*;
-    use crate::lie::so3;
     use crate::constant_curvature::ConstantCurvatureSettings;
+    use crate::lie::so3;
     use crate::robot::{Backbone, BackboneSpec, PerDisk, Routing, Tendon};
 
     fn robot(placed: bool) -> Robot {

@@ -10,10 +10,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bounds::{Bounds, Draw, Reach};
 use super::chain::Chain;
+use super::rows::Inverter;
 use super::search::{Effort, Found, Search};
 use super::{InverseSettings, Method, Target};
-use crate::constant_curvature::{Arc, ConstantCurvatureSettings, Plan};
+use crate::constant_curvature::{self, Arc, ConstantCurvature, ConstantCurvatureSettings, Plan};
 use crate::error::InvalidInput;
+use crate::model::Model;
 use crate::robot::Robot;
 use crate::solve::fit::Problem;
 use crate::status::Status;
@@ -101,7 +103,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         let effort = self.effort(&work.chain, FEW);
         let effort = Effort { first: FEW * k, fall_back: false, nearest: false, ..effort };
         work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| {
-            self.start(target, k, point);
+            self.begin(target, k, point);
         });
         let lengths = self.robot.backbone().lengths();
         bends.clear();
@@ -147,10 +149,11 @@ impl<'a> ConstantCurvatureInverse<'a> {
         };
         let start = start.filter(usable);
         let given = usize::from(start.is_some());
-        let found = work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| match start {
-            Some(arcs) if k == 0 => self.unknowns(arcs, point),
-            _ => self.start(target, k - given, point),
-        });
+        let found =
+            work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| match start {
+                Some(arcs) if k == 0 => self.unknowns(arcs, point),
+                _ => self.begin(target, k - given, point),
+            });
         Self::answer(found, &work.chain)
     }
 
@@ -164,7 +167,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         let effort = self.effort(&work.chain, self.settings.starts);
         let found = work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| {
             if k > 0 {
-                self.start(target, k - 1, point);
+                self.begin(target, k - 1, point);
             }
         });
         Self::answer(found, &work.chain)
@@ -189,7 +192,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
             }
             let effort = Effort { first: k, ..self.effort(&work.chain, 1) };
             let found = work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| {
-                self.start(target, k, point);
+                self.begin(target, k, point);
             });
             if found.status != Status::Converged {
                 continue;
@@ -268,7 +271,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// The k-th start: one arc to the target, which is the answer for a single segment; nearly straight;
     /// then random ones, each from its own stream.
-    fn start(&self, target: &Target, k: usize, point: &mut Vec<f64>) {
+    fn begin(&self, target: &Target, k: usize, point: &mut Vec<f64>) {
         point.clear();
         match k {
             0 => self.single_arc(target, point),
@@ -334,7 +337,11 @@ impl<'a> ConstantCurvatureInverse<'a> {
 /// plane; what it is off along the plane, i, is as if the radius were less by i: at half the angle h, with
 /// `q = (r - i) sin h + tool_z cos h`, `point - tool` is at `2 q sin h` across and `point` at
 /// `2 q cos h - tool_z` along z.
-pub(super) fn arc_to(point: &Vector3<f64>, tool: &Vector3<f64>, wanted: f64) -> (Vector2<f64>, f64) {
+pub(super) fn arc_to(
+    point: &Vector3<f64>,
+    tool: &Vector3<f64>,
+    wanted: f64,
+) -> (Vector2<f64>, f64) {
     let off = (point - tool).xy();
     let (across, along) = (off.norm(), point.z + tool.z);
     let direction = if across > 0.0 { off / across } else { Vector2::x() };
@@ -354,6 +361,55 @@ pub(super) fn arc_to(point: &Vector3<f64>, tool: &Vector3<f64>, wanted: f64) -> 
 /// What a first guess may miss \[m, rad\], and its starts.
 const GUESS: f64 = 1e-6;
 const FEW: usize = 8;
+
+impl<'a> Inverter for ConstantCurvatureInverse<'a> {
+    type Start = Vec<Arc>;
+    type Work<'w>
+        = Workspace<'w>
+    where
+        Self: 'w;
+
+    fn robot(&self) -> &Robot {
+        self.robot
+    }
+
+    fn settings(&self) -> &InverseSettings {
+        &self.settings
+    }
+
+    fn start(&self, displacements: &[f64]) -> Result<Vec<Arc>, InvalidInput> {
+        self.robot.check_displacements(displacements)?;
+        let mut work = constant_curvature::Workspace::default();
+        ConstantCurvature::new(self.robot, &self.plan).solve(displacements, &mut work)?;
+        Ok(work.arcs().to_vec())
+    }
+
+    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Workspace<'w> {
+        let work = self.workspace();
+        match stop {
+            Some(stop) => work.stopped_by(stop),
+            None => work,
+        }
+    }
+
+    fn solve(&self, target: &Target, start: Option<&Vec<Arc>>, work: &mut Workspace<'_>) -> Answer {
+        Self::solve(self, target, start.map(Vec::as_slice), work)
+    }
+
+    fn follow(&self, target: &Target, work: &mut Workspace<'_>) -> Answer {
+        Self::follow(self, target, work)
+    }
+
+    fn write_displacements(&self, work: &Workspace<'_>, place: &mut [f64]) {
+        Self::write_displacements(self, work, place);
+    }
+
+    fn write_tensions(&self, _: &Workspace<'_>, _: &mut [f64]) {}
+
+    fn message(&self, answer: &Answer, work: &Workspace<'_>) -> String {
+        Self::message(self, answer, work)
+    }
+}
 
 /// What stood in the way, in a sentence: the bounds that hold back, and what freedom is spent on.
 pub(super) fn tell<S: Borrow<str>>(

@@ -19,7 +19,7 @@ use nalgebra::{Matrix3, Vector3};
 pub use bounds::{Bounds, Range};
 pub use constant_curvature::{Answer, ConstantCurvatureInverse, Solution, Workspace};
 pub use rod::{RodInverse, RodWorkspace};
-pub use rows::{InverseRows, invert_path, invert_rows};
+pub use rows::{InverseRows, Inverter, invert_path, invert_rows};
 pub use settings::{InverseSettings, Method};
 
 use crate::error::InvalidInput;

@@ -98,6 +98,7 @@ impl Problem<6> for Pull<'_> {
     }
 
     fn squared(&mut self, z: &[f64]) -> f64 {
+        // What is infinite is no value, to a swarm.
         if self.place(z) { self.aim.residual().norm_squared() } else { f64::INFINITY }
     }
 

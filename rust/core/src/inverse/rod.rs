@@ -1,5 +1,6 @@
 //! The inverse of the strain-energy rod.
 
+use std::f64::consts::TAU;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Vector2, Vector3};
@@ -9,13 +10,14 @@ use rand_chacha::ChaCha8Rng;
 use super::bounds::{Bounds, Space};
 use super::constant_curvature::{self, Answer, ConstantCurvatureInverse, arc_to, tell};
 use super::pull::Pull;
+use super::rows::Inverter;
 use super::search::{Effort, Found, Search};
 use super::{InverseSettings, Method, Target};
 use crate::error::InvalidInput;
-use crate::model::State;
+use crate::model::{Model, State};
 use crate::robot::Robot;
 use crate::rod::pulled::Pulled;
-use crate::rod::{Plan, Rod, TendonRule};
+use crate::rod::{self, Plan, Rod, TendonRule};
 use crate::solve::bounded::Bounded;
 use crate::solve::fit::Problem;
 use crate::solve::region::Region;
@@ -30,15 +32,8 @@ pub struct RodWorkspace<'a> {
     bends: Vec<Vector2<f64>>,
     /// Whether the last solve met its target.
     met: bool,
-}
-
-impl<'a> RodWorkspace<'a> {
-    /// Ends solves before their next start when the flag is set.
-    #[must_use]
-    pub fn stopped_by(mut self, stop: &'a AtomicBool) -> Self {
-        self.search.stop = Some(stop);
-        self
-    }
+    /// The point and the tool's place of the row before the last, along a path.
+    before: Option<(Vec<f64>, Vector3<f64>)>,
 }
 
 /// A robot prepared for inverse solves with the rod model.
@@ -60,6 +55,9 @@ pub struct RodInverse<'a> {
     arcs: Option<ConstantCurvatureInverse<'a>>,
 }
 
+/// No tension is more than what would bend the rod by two turns alone, unless bounds ask for it \[rad\]: targets just out
+/// of reach are led to infinite ones, which stretch it.
+const MOST: f64 = 2.0 * TAU;
 /// Swarms and random starts seek unknowns up to here \[rad\].
 const WIDEST: f64 = 4.0;
 /// Every other random start is no wider than this.
@@ -70,6 +68,10 @@ const LEVER: f64 = 1e-3;
 /// targets.
 const JUMP: f64 = 0.5;
 const SHORTEST: f64 = 1.0 / 64.0;
+/// Where the tool goes so many times as far as before, or further, no start is read off the way before.
+const FARTHEST: f64 = 2.0;
+/// Starts of a target on a path that steps do not lead to.
+const FEW: usize = 16;
 /// A bound that is this near holds back \[rad, m\].
 const AT_EDGE: f64 = 1e-9;
 /// Share of the trace that makes first guesses unique.
@@ -118,90 +120,28 @@ impl<'a> RodInverse<'a> {
         for (k, name) in self.robot.tendon_names().iter().enumerate() {
             let unit = self.units[k] * self.rest.unit();
             let (lower, upper) = bounds.tension.as_ref().map_or((0.0, f64::INFINITY), |r| r.at(k));
-            let (lower, upper) = (lower.max(0.0) / unit, upper / unit);
+            let lower = lower.max(0.0) / unit;
+            let upper = (upper / unit).min(lower + MOST);
             let mut normal = vec![0.0; count];
             normal[k] = 1.0;
-            if self.space.region.bound(&normal, upper) {
-                self.labels.push(format!("tension of '{name}'"));
-            }
+            self.space.region.bound(&normal, upper);
+            self.labels.push(format!("tension of '{name}'"));
             normal[k] = -1.0;
             self.space.region.bound(&normal, -lower);
             // A slack tendon is no news.
-            self.labels.push(if lower > 0.0 { format!("pretension of '{name}'") } else { String::new() });
+            self.labels.push(if lower > 0.0 {
+                format!("pretension of '{name}'")
+            } else {
+                String::new()
+            });
             self.space.lower.push(lower);
             self.space.upper.push(upper.min(lower + WIDEST));
         }
     }
 
-    /// The robot it was prepared from.
-    #[must_use]
-    pub fn robot(&self) -> &Robot {
-        self.robot
-    }
-
-    /// The choices it was prepared with.
-    #[must_use]
-    pub fn settings(&self) -> &InverseSettings {
-        &self.settings
-    }
-
-    /// Buffers for this inverse.
-    #[must_use]
-    pub fn workspace(&self) -> RodWorkspace<'_> {
-        let pull = Pull::new(
-            self.rest.clone(),
-            &self.settings,
-            &self.units,
-            &self.ranges,
-        );
-        RodWorkspace {
-            pull,
-            search: Search::default(),
-            guess: self.arcs.as_ref().map(ConstantCurvatureInverse::workspace),
-            bends: Vec::new(),
-            met: false,
-        }
-    }
-
-    /// Seeks tensions that bring the tool to `target`; first from `start`, a shape with its tensions, if given.
-    pub fn solve(
-        &self,
-        target: &Target,
-        start: Option<&State>,
-        work: &mut RodWorkspace<'_>,
-    ) -> Answer {
-        let given = match start {
-            Some(state) => work.pull.pulled.begin(state),
-            None => {
-                work.pull.pulled.rest();
-                false
-            }
-        };
-        self.search(target, given, work)
-    }
-
-    /// Seeks again from where the last solve in `work` ended, as along a path: in steps between which the tool is
-    /// moved and turned evenly, where one step does not lead there without a jump; from other starts only when
-    /// that fails, and then `starts` is more than 1.
-    pub fn follow(&self, target: &Target, work: &mut RodWorkspace<'_>) -> Answer {
-        if !work.met {
-            let given = work.search.point.len() == self.units.len();
-            return self.search(target, given, work);
-        }
-        let point = work.search.point.clone();
-        work.pull.aim.at(*target);
-        if let Some(answer) = self.walk(work) {
-            return answer;
-        }
-        work.search.point = point;
-        work.search.fit.evaluate(&mut work.pull, &work.search.point);
-        let answer = self.search(target, true, work);
-        Answer { starts: answer.starts + 1, ..answer }
-    }
-
     /// Goes from the point at hand to the target aimed at; nothing where steps do not lead there.
     fn walk(&self, work: &mut RodWorkspace<'_>) -> Option<Answer> {
-        let RodWorkspace { pull, search, .. } = work;
+        let RodWorkspace { pull, search, before, .. } = work;
         let effort = Effort { fall_back: false, nearest: false, ..self.effort(1) };
         let (from, to) = (pull.pulled.tool, pull.aim.target());
         let (mut done, mut stride, mut iterations) = (0.0, 1.0_f64, 0);
@@ -209,6 +149,17 @@ impl<'a> RodInverse<'a> {
         while done < 1.0 {
             let next = (done + stride).min(1.0);
             pull.aim.between(&from, &to, next);
+            if stride >= 1.0
+                && let Some((point, place)) = before
+            {
+                // On as before, by the share of the way that the tool goes now.
+                let share = (to.position() - from.translation).norm()
+                    / (from.translation - *place).norm().max(f64::MIN_POSITIVE);
+                if share < FARTHEST {
+                    let pairs = search.point.iter_mut().zip(point.iter());
+                    pairs.for_each(|(own, before)| *own += share * (*own - before));
+                }
+            }
             let found = search.run(pull, &self.space, effort, |_, _| {});
             iterations += found.iterations;
             let pairs = search.point.iter().zip(&last);
@@ -229,17 +180,24 @@ impl<'a> RodInverse<'a> {
     }
 
     /// Seeks from the point at hand, if it is one to start from, then from all starts.
-    fn search(&self, target: &Target, given: bool, work: &mut RodWorkspace<'_>) -> Answer {
-        let effort = self.effort(self.settings.starts);
-        let RodWorkspace { pull, search, guess, bends, met } = work;
+    fn search(
+        &self,
+        target: &Target,
+        given: bool,
+        effort: Effort<'_>,
+        work: &mut RodWorkspace<'_>,
+    ) -> Answer {
+        let RodWorkspace { pull, search, guess, bends, met, before: row_before } = work;
+        *row_before = None;
         pull.aim.at(*target);
-        let first: Vec<f64> = if given { self.unknowns(pull.pulled.tensions()) } else { Vec::new() };
+        let first: Vec<f64> =
+            if given { self.unknowns(pull.pulled.tensions()) } else { Vec::new() };
         let before = usize::from(given);
         let mut start = |k: usize, point: &mut Vec<f64>| {
             if given && k == 0 {
                 point.clone_from(&first);
             } else {
-                self.start(target, k - before, guess.as_mut(), bends, point);
+                self.begin(target, k - before, guess.as_mut(), bends, point);
             }
         };
         let mut found = search.run(pull, &self.space, effort, &mut start);
@@ -270,7 +228,7 @@ impl<'a> RodInverse<'a> {
 
     /// The k-th start: what tensions come nearest to the arcs of constant curvature, or to a single arc to the
     /// target; hardly pulled; and random ones, each from its own stream.
-    fn start(
+    fn begin(
         &self,
         target: &Target,
         k: usize,
@@ -334,10 +292,81 @@ impl<'a> RodInverse<'a> {
             point.push(if pulls { lower + more } else { *lower });
         }
     }
+}
 
-    /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
-    #[must_use]
-    pub fn message(&self, answer: &Answer, work: &RodWorkspace<'_>) -> String {
+impl<'a> Inverter for RodInverse<'a> {
+    type Start = State;
+    type Work<'w>
+        = RodWorkspace<'w>
+    where
+        Self: 'w;
+
+    fn robot(&self) -> &Robot {
+        self.robot
+    }
+
+    fn settings(&self) -> &InverseSettings {
+        &self.settings
+    }
+
+    fn start(&self, displacements: &[f64]) -> Result<State, InvalidInput> {
+        self.robot.check_displacements(displacements)?;
+        let (rod, mut work) = (self.rest.rod(), rod::Workspace::default());
+        rod.solve(displacements, &mut work)?;
+        Ok(rod.take_state(work))
+    }
+
+    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> RodWorkspace<'w> {
+        let rest = self.rest.clone();
+        RodWorkspace {
+            pull: Pull::new(rest, &self.settings, &self.units, &self.ranges),
+            search: Search { stop, ..Search::default() },
+            guess: self.arcs.as_ref().map(ConstantCurvatureInverse::workspace),
+            bends: Vec::new(),
+            met: false,
+            before: None,
+        }
+    }
+
+    /// The start is a shape with its tensions.
+    fn solve(&self, target: &Target, start: Option<&State>, work: &mut RodWorkspace<'_>) -> Answer {
+        let given = match start {
+            Some(state) => work.pull.pulled.begin(state),
+            None => {
+                work.pull.pulled.rest();
+                false
+            }
+        };
+        self.search(target, given, self.effort(self.settings.starts), work)
+    }
+
+    /// In steps between which the tool is moved and turned evenly, where one step does not lead there without a
+    /// jump; from a few other starts only when that fails, and then `starts` is more than 1.
+    fn follow(&self, target: &Target, work: &mut RodWorkspace<'_>) -> Answer {
+        let few = self.effort(self.settings.starts.min(FEW));
+        if !work.met {
+            let given = work.search.point.len() == self.units.len();
+            return self.search(target, given, Effort { fall_back: false, ..few }, work);
+        }
+        let here = (work.search.point.clone(), work.pull.pulled.tool.translation);
+        work.pull.aim.at(*target);
+        if let Some(answer) = self.walk(work) {
+            work.before = Some(here);
+            return answer;
+        }
+        work.search.point = here.0;
+        work.search.fit.evaluate(&mut work.pull, &work.search.point);
+        let answer = self.search(target, true, Effort { fall_back: false, ..few }, work);
+        Answer { starts: answer.starts + 1, ..answer }
+    }
+
+    fn write_tensions(&self, work: &RodWorkspace<'_>, place: &mut [f64]) {
+        for (own, tension) in place.iter_mut().zip(work.pull.pulled.tensions()) {
+            *own = tension * self.rest.unit();
+        }
+    }
+
+    fn message(&self, answer: &Answer, work: &RodWorkspace<'_>) -> String {
         let names = self.robot.tendon_names();
         let (edges, _) = self.space.region.at_edge(&work.search.point, AT_EDGE);
         let labels = edges.iter().map(|k| self.labels[*k].clone());
@@ -348,8 +377,7 @@ impl<'a> RodInverse<'a> {
         tell(answer, &self.settings, &held, "tension")
     }
 
-    /// The displacements of what the last solve in `work` found \[m\].
-    pub fn write_displacements(&self, work: &RodWorkspace<'_>, place: &mut [f64]) {
+    fn write_displacements(&self, work: &RodWorkspace<'_>, place: &mut [f64]) {
         for (k, (displacement, (lower, upper))) in place.iter_mut().zip(&self.ranges).enumerate() {
             *displacement = work.pull.pulled.displacement(k).max(*lower).min(*upper);
         }

@@ -26,7 +26,7 @@ pub(super) struct Search<'a> {
     pub(super) stop: Option<&'a AtomicBool>,
     pub(super) swarm: Option<Swarm>,
     /// Where descents ended that did not meet the target, by their squared residual, best first.
-    candidates: Vec<(f64, Vec<f64>)>,
+    pub(super) candidates: Vec<(f64, Vec<f64>)>,
 }
 
 /// How a search ended.

@@ -23,8 +23,9 @@ const BALANCED: f64 = 1e-6;
 const PATIENCE: usize = 12;
 /// No strain moves further in one step \[rad\].
 const STEP: f64 = 0.5;
-/// Steps between two sets of tensions are not made shorter.
-const SHORTEST: f64 = 1e-3;
+/// Steps between two sets of tensions at most, and the shortest one.
+const STEPS: usize = 20;
+const SHORTEST: f64 = 1e-2;
 
 /// A balance under tensions.
 #[derive(Clone, Debug, Default)]
@@ -88,6 +89,11 @@ impl<'r> Pulled<'r> {
         self.rod.plan
     }
 
+    /// The model of displacements.
+    pub(crate) fn rod(&self) -> &Rod<'r> {
+        &self.rod
+    }
+
     /// The robot it was made of.
     pub(crate) fn robot(&self) -> &'r Robot {
         self.rod.robot
@@ -139,12 +145,15 @@ impl<'r> Pulled<'r> {
         let away = self.points.each_ref().map(|point| point.away(tensions));
         let nearest = (0..3).fold(0, |best, k| if away[k] < away[best] { k } else { best });
         self.at = nearest;
-        let mut whole = 1.0;
-        while self.points[self.at].away(tensions) > 0.0 {
-            let Some(next) = self.step(tensions, &mut whole) else { return false };
+        let mut share = 1.0;
+        for _ in 0..STEPS {
+            if self.points[self.at].away(tensions) == 0.0 {
+                return true;
+            }
+            let Some(next) = self.step(tensions, &mut share) else { return false };
             self.at = next;
         }
-        self.points[self.at].sound
+        self.points[self.at].away(tensions) == 0.0
     }
 
     /// One step towards tensions, of a share of the way that is left; the point that it leads to.
@@ -190,9 +199,8 @@ impl<'r> Pulled<'r> {
     fn farthest(&self, tensions: &[f64]) -> usize {
         let others = (0..3).filter(|k| *k != self.at);
         others.fold(usize::MAX, |worst, k| {
-            let further = |a: usize, b: usize| {
-                self.points[a].away(tensions) > self.points[b].away(tensions)
-            };
+            let further =
+                |a: usize, b: usize| self.points[a].away(tensions) > self.points[b].away(tensions);
             if worst == usize::MAX || further(k, worst) { k } else { worst }
         })
     }
@@ -201,7 +209,9 @@ impl<'r> Pulled<'r> {
     /// derivatives by the tensions: `−(S + C)`, row by row \[m\].
     pub(crate) fn displacement(&self, k: usize) -> f64 {
         let (plan, chain) = (self.plan(), &self.points[self.at].chain);
-        chain.over[k] + chain.slope[k] - plan.compliance[k] * chain.tensions[k] - plan.rest_lengths[k]
+        chain.over[k] + chain.slope[k]
+            - plan.compliance[k] * chain.tensions[k]
+            - plan.rest_lengths[k]
     }
 
     /// Derivative of a displacement by a tension.
@@ -238,8 +248,7 @@ impl<'r> Pulled<'r> {
         let (columns, shares) = (&mut self.columns, &mut self.shares);
         // What balance the strains lack moves the tool by this.
         let mut lack: Twist = (Vector3::zeros(), Vector3::zeros());
-        let at =
-            Solved { strains: &chain.strains, factors: &chain.factors, frames: &self.frames };
+        let at = Solved { strains: &chain.strains, factors: &chain.factors, frames: &self.frames };
         self.sweep.run::<D>(plan, &at, &self.tool.translation, |i, rows| {
             let product = |image: &[f64]| {
                 let by = |k: usize| -dot(&rows[k * size..(k + 1) * size], image);

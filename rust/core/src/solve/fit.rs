@@ -170,8 +170,7 @@ impl<const R: usize> Workspace<R> {
         self.trial_jacobian.resize(region.size(), SVector::zeros());
         self.evaluate(problem, z);
         if problem.violation() > WITHIN {
-            let (mut residual, mut jacobian) =
-                (self.residual, std::mem::take(&mut self.jacobian));
+            let (mut residual, mut jacobian) = (self.residual, std::mem::take(&mut self.jacobian));
             let inside = self.come_back(problem, region, z, &mut residual, &mut jacobian);
             (self.residual, self.jacobian) = (residual, jacobian);
             if !inside {
