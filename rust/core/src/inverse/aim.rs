@@ -74,6 +74,13 @@ impl<'a> Aim<'a> {
         self.target
     }
 
+    /// How far a target is from a place of the tool, over the robot's length, and its angle \[rad\].
+    pub(super) fn way(&self, from: &Pose, to: &Target) -> f64 {
+        let turn = |rotation| so3::log(&from.rotation.tr_mul(rotation)).norm();
+        let off = (to.position() - from.translation).norm();
+        off / self.robot.backbone().total_length() + to.rotation().map_or(0.0, turn)
+    }
+
     /// Aims at a share of the way from a place of the tool to a target, both in the base's frame.
     pub(super) fn between(&mut self, from: &Pose, to: &Target, share: f64) {
         if share >= 1.0 {

@@ -57,16 +57,27 @@ impl<'a> Pull<'a> {
 
     /// Goes to the balance under the tensions of a point and places the tool.
     fn place(&mut self, z: &[f64]) -> bool {
-        self.tensions.clear();
         // Rounding leaves no tension below zero.
-        self.tensions.extend(z.iter().zip(self.units).map(|(z, unit)| (z * unit).max(0.0)));
-        self.sound = self.pulled.go(&self.tensions);
+        let tension = |(z, unit): (&f64, &f64)| (z * unit).max(0.0);
+        let wanted = z.iter().zip(self.units).map(tension);
+        if !(self.sound && wanted.clone().eq(self.tensions.iter().copied())) {
+            self.tensions.clear();
+            self.tensions.extend(wanted);
+            self.sound = self.pulled.go(&self.tensions);
+            if self.sound {
+                self.pulled.differentiate();
+            }
+        }
         if self.sound {
-            self.pulled.differentiate();
             let tool = self.pulled.tool;
             self.aim.place(tool.translation, || tool.rotation);
         }
         self.sound
+    }
+
+    /// Forgets the point evaluated last: the rod is put elsewhere.
+    pub(super) fn forget(&mut self) {
+        self.sound = false;
     }
 
     /// Bounds on displacements that hold the point evaluated last back: a tendon, and whether its release is.

@@ -36,6 +36,36 @@ pub struct RodWorkspace<'a> {
     before: Option<(Vec<f64>, Vector3<f64>)>,
 }
 
+/// Where a step along a path led.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Gone {
+    There,
+    Jumped,
+    Astray,
+}
+
+impl RodWorkspace<'_> {
+    /// Descends from the point at hand to the target aimed at; whether no unknown is further than a limit from
+    /// where it was.
+    fn go_on(
+        &mut self,
+        space: &Space,
+        effort: Effort<'_>,
+        (from, limit): (&[f64], f64),
+        iterations: &mut usize,
+    ) -> Gone {
+        let found = self.search.run(&mut self.pull, space, effort, |_, _| {});
+        *iterations += found.iterations;
+        let pairs = self.search.point.iter().zip(from);
+        let moved = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        match found.status {
+            Status::Converged if moved <= limit => Gone::There,
+            Status::Converged => Gone::Jumped,
+            _ => Gone::Astray,
+        }
+    }
+}
+
 /// A robot prepared for inverse solves with the rod model.
 #[derive(Clone, Debug)]
 pub struct RodInverse<'a> {
@@ -67,6 +97,8 @@ const LEVER: f64 = 1e-3;
 /// Along a path no unknown changes by more in one step \[rad\], and no step is a smaller share of the way between two
 /// targets.
 const JUMP: f64 = 0.5;
+/// Nor, on the way to less tension, by more than this times the tool's way over the robot's length.
+const RATE: f64 = 50.0;
 const SHORTEST: f64 = 1.0 / 64.0;
 /// Where the tool goes so many times as far as before, or further, no start is read off the way before.
 const FARTHEST: f64 = 2.0;
@@ -141,42 +173,46 @@ impl<'a> RodInverse<'a> {
 
     /// Goes from the point at hand to the target aimed at; nothing where steps do not lead there.
     fn walk(&self, work: &mut RodWorkspace<'_>) -> Option<Answer> {
-        let RodWorkspace { pull, search, before, .. } = work;
         let effort = Effort { fall_back: false, nearest: false, ..self.effort(1) };
-        let (from, to) = (pull.pulled.tool, pull.aim.target());
+        let (from, to) = (work.pull.pulled.tool, work.pull.aim.target());
         let (mut done, mut stride, mut iterations) = (0.0, 1.0_f64, 0);
-        let mut last = search.point.clone();
+        let way = work.pull.aim.way(&from, &to);
+        let mut last = work.search.point.clone();
         while done < 1.0 {
             let next = (done + stride).min(1.0);
-            pull.aim.between(&from, &to, next);
+            work.pull.aim.between(&from, &to, next);
             if stride >= 1.0
-                && let Some((point, place)) = before
+                && let Some((point, place)) = &work.before
             {
                 // On as before, by the share of the way that the tool goes now.
                 let share = (to.position() - from.translation).norm()
                     / (from.translation - *place).norm().max(f64::MIN_POSITIVE);
                 if share < FARTHEST {
-                    let pairs = search.point.iter_mut().zip(point.iter());
+                    let pairs = work.search.point.iter_mut().zip(point.iter());
                     pairs.for_each(|(own, before)| *own += share * (*own - before));
                 }
             }
-            let found = search.run(pull, &self.space, effort, |_, _| {});
-            iterations += found.iterations;
-            let pairs = search.point.iter().zip(&last);
-            let moved = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-            if found.status == Status::Converged && moved <= JUMP {
+            let limit = if effort.redundant { JUMP.min(RATE * way * (next - done)) } else { JUMP };
+            let mut gone = work.go_on(&self.space, effort, (&last, limit), &mut iterations);
+            if gone == Gone::Jumped && effort.redundant {
+                // The branch of least tensions may end or turn away here: on without.
+                work.search.point.clone_from(&last);
+                let as_it_is = Effort { redundant: false, ..effort };
+                gone = work.go_on(&self.space, as_it_is, (&last, JUMP), &mut iterations);
+            }
+            if gone == Gone::There {
                 (done, stride) = (next, 2.0 * stride);
-                last.clone_from(&search.point);
+                last.clone_from(&work.search.point);
             } else {
-                search.point.clone_from(&last);
+                work.search.point.clone_from(&last);
                 stride = 0.5 * (next - done);
-                if stride < SHORTEST || search.stopped() {
+                if stride < SHORTEST || work.search.stopped() {
                     return None;
                 }
             }
         }
         let found = Found { status: Status::Converged, iterations, starts: 1 };
-        Some(answer(found, pull, search))
+        Some(answer(found, &mut work.pull, &mut work.search))
     }
 
     /// Seeks from the point at hand, if it is one to start from, then from all starts.
@@ -330,6 +366,7 @@ impl<'a> Inverter for RodInverse<'a> {
 
     /// The start is a shape with its tensions.
     fn solve(&self, target: &Target, start: Option<&State>, work: &mut RodWorkspace<'_>) -> Answer {
+        work.pull.forget();
         let given = match start {
             Some(state) => work.pull.pulled.begin(state),
             None => {
