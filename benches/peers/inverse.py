@@ -1,10 +1,11 @@
-"""The inverse of the rod, side by side in one run: tdcr and scipy's least_squares on tdcr's forward.
+"""The inverse of the rod, side by side in one run: tdcr and scipy on tdcr's forward.
 
-Three segments with three tendons each, straight and helical; positions and poses of shapes under random tensions.
-scipy gets what a user would write with this package and without its inverse: the residual of the tip of `forward`, in
-displacements (Jacobian of tdcr or differences) or in tensions of 0 and more (differences, all tendons free), started from
-constant curvature's answer where there is one, else from rest, and the same residual scale. An answer counts when
-`forward` of its displacements, from rest, converges within 1e-8 m and 1e-8 rad of the target.
+Three segments with three tendons each, straight and winding; positions and poses of shapes under
+random tensions. scipy gets what a user would write with this package and without its inverse: the
+residual of the tip of `forward`, in displacements (with tdcr's Jacobian or differences; from
+constant curvature's answer where there is one, else from rest) or in tensions of 0 and more
+(differences). An answer counts when `forward` of its displacements, from rest, converges within
+1e-8 m and 1e-8 rad of the target.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def random_tips(robot: tdcr.Robot, count: int, seed: int) -> Array:
 
 
 def miss(tip: Array, target: Array) -> Array:
-    """Return the residual of a tip: position, and rotation vector in the target's frame times `RADIAN`."""
+    """Return position and rotation vector (target's frame, times `RADIAN`) from target to tip."""
     if target.shape == (3,):
         return tip[:3, 3] - target
     turn = target[:3, :3].T @ tip[:3, :3]
@@ -62,7 +63,7 @@ def miss(tip: Array, target: Array) -> Array:
 
 
 def guess(robot: tdcr.Robot, target: Array) -> Array:
-    """Return the displacements of constant curvature's answer where the routing has one, else rest."""
+    """Return displacements of constant curvature's answer where the routing has one, else rest."""
     try:
         return tdcr.inverse(robot, target, model="constant_curvature").displacements
     except tdcr.InvalidInput:

@@ -127,9 +127,7 @@ def test_bounds_hold():
     assert (bound.tensions <= most + 1e-6).all()
     assert (np.abs(bound.displacements) <= 0.02).all()
     pull = free.displacements.min()
-    short = tdcr.inverse(
-        robot, target, bounds=(0.5 * pull, 0.5), search=InverseSettings(starts=5)
-    )
+    short = tdcr.inverse(robot, target, bounds=(0.5 * pull, 0.5), search=InverseSettings(starts=5))
     assert short.displacements.min() >= 0.5 * pull
     assert short.ok or "pull of" in short.message
     none = tdcr.inverse(robot, target, bounds=(0.03, 0.04), search=InverseSettings(starts=2))
@@ -186,8 +184,8 @@ def test_bad_input_is_refused(keywords, argument):
 
 def test_constant_curvature_has_no_tensions():
     robot = trunk()
+    bounds = Bounds(tension=(0, 1))
     with pytest.raises(tdcr.InvalidInput, match="knows no forces"):
-        bounds = Bounds(tension=(0, 1))
         tdcr.inverse(robot, [0.0, 0.02, 0.1], model="constant_curvature", bounds=bounds)
     answer = tdcr.inverse(robot, [0.0, 0.02, 0.1], model="constant_curvature")
     assert np.isnan(answer.tensions).all()

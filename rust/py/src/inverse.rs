@@ -91,7 +91,7 @@ enum Plans<'a> {
 /// An inverse of one of the models.
 enum Engine<'a> {
     Arcs(ConstantCurvatureInverse<'a>),
-    Rod(RodInverse<'a>),
+    Rod(Box<RodInverse<'a>>),
 }
 
 impl<'a> Plans<'a> {
@@ -132,7 +132,10 @@ impl<'a> Plans<'a> {
             Self::Arcs(plan) => {
                 ConstantCurvatureInverse::new(robot, plan, &bounds, search).map(Engine::Arcs)
             }
-            Self::Rod(plan) => RodInverse::new(robot, plan, &bounds, search).map(Engine::Rod),
+            Self::Rod(plan) => {
+                let inverse = RodInverse::new(robot, plan, &bounds, search);
+                inverse.map(|inverse| Engine::Rod(Box::new(inverse)))
+            }
         }
         .map_err(|e| invalid(&e))
     }
@@ -223,7 +226,7 @@ pub(crate) fn _inverse(
             invert_one(py, inverse, &target, start, soon(inverse.settings(), 1))
         }
         Engine::Rod(inverse) => {
-            invert_one(py, inverse, &target, start, soon(inverse.settings(), ROD))
+            invert_one(py, &**inverse, &target, start, soon(inverse.settings(), ROD))
         }
     }
 }
@@ -318,7 +321,7 @@ pub(crate) fn _inverse_batch<'py>(
     let pool = pool.as_deref();
     match &engine {
         Engine::Arcs(inverse) => invert_many(py, inverse, &targets, start, pool, progress),
-        Engine::Rod(inverse) => invert_many(py, inverse, &targets, start, pool, progress),
+        Engine::Rod(inverse) => invert_many(py, &**inverse, &targets, start, pool, progress),
     }
 }
 

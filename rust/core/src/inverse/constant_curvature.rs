@@ -362,7 +362,7 @@ pub(super) fn arc_to(
 const GUESS: f64 = 1e-6;
 const FEW: usize = 8;
 
-impl<'a> Inverter for ConstantCurvatureInverse<'a> {
+impl Inverter for ConstantCurvatureInverse<'_> {
     type Start = Vec<Arc>;
     type Work<'w>
         = Workspace<'w>

@@ -202,3 +202,86 @@ impl Pull<'_> {
         self.units.iter().map(|unit| unit * unit).sum::<f64>() / self.units.len().max(1) as f64
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // A test may stop where it fails.
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::super::Target;
+    use super::super::bounds::Bounds;
+    use super::super::rod::RodInverse;
+    use super::super::rows::Inverter;
+    use super::*;
+    use crate::lie::{Pose, so3};
+    use crate::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
+    use crate::rod::{Plan, RodSettings};
+
+    fn robot() -> Robot {
+        let tendon = |k: usize| {
+            let at = |i: usize| 2.1 * k as f64 + 0.05 * (k + 1) as f64 * i as f64;
+            let azimuth = PerDisk::Each((0..=12).map(at).collect());
+            let routing = Routing::Angles { azimuth, radius: PerDisk::Same(0.008) };
+            Tendon::new(routing, None, None, None).unwrap()
+        };
+        let backbone = Backbone::new(BackboneSpec::straight(0.2, 12)).unwrap();
+        Robot::new(backbone, (0..4).map(tendon).collect(), None, None, None).unwrap()
+    }
+
+    /// The Jacobian and the slopes of displacements against differences; second derivatives, which leave out how
+    /// the stiffness changes, to a tenth of the largest.
+    #[test]
+    fn derivatives_agree_with_differences() {
+        let robot = robot();
+        let settings = InverseSettings::default();
+        for elements in [1, 2] {
+            let plan = Plan::new(&robot, RodSettings { elements, ..RodSettings::default() });
+            let plan = plan.unwrap();
+            let bounds = Bounds::default();
+            let inverse = RodInverse::new(&robot, &plan, &bounds, settings).unwrap();
+            let mut work = inverse.buffers(None);
+            let pull = &mut work.pull;
+            let turn = so3::exp(&Vector3::new(0.5, -0.3, 0.2));
+            let translation = Vector3::new(0.05, 0.02, 0.15);
+            pull.aim.at(Target::Pose(Pose { rotation: turn, translation }));
+            check(pull, &[0.9, 0.5, 0.0, 0.7]);
+        }
+    }
+
+    fn check(pull: &mut Pull<'_>, z: &[f64]) {
+        let h = 1e-4;
+        let weights = Vector6::new(0.3, -0.7, 0.5, 0.4, 0.2, -0.6);
+        let mut at = |z: &[f64]| {
+            let (mut residual, mut jacobian) = (Vector6::zeros(), vec![Vector6::zeros(); 4]);
+            pull.evaluate(z, &mut residual, &mut jacobian);
+            let mut hessian = vec![0.0; 16];
+            pull.add_hessian(z, &weights, &mut hessian);
+            let own: Vec<f64> = (0..4).map(|k| pull.pulled.displacement(k)).collect();
+            let slope = |k: usize, j: usize| pull.pulled.displacement_slope(k, j) * pull.units[j];
+            let slopes: Vec<f64> = (0..16).map(|i| slope(i / 4, i % 4)).collect();
+            (residual, jacobian, hessian, own, slopes)
+        };
+        let (_, jacobian, hessian, _, slopes) = at(z);
+        let most = hessian.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+        for b in 0..4 {
+            let mut moved = |by: f64| {
+                let mut z = z.to_vec();
+                z[b] += by;
+                at(&z)
+            };
+            // None is pulled below zero: differences of second order to one side.
+            let (once, twice, none) = (moved(h), moved(2.0 * h), moved(0.0));
+            let slope = (once.0 * 4.0 - twice.0 - none.0 * 3.0) / (2.0 * h);
+            assert!((slope - jacobian[b]).amax() < 1e-6, "{b} {slope} {}", jacobian[b]);
+            for k in 0..4 {
+                let slope = (4.0 * once.3[k] - twice.3[k] - 3.0 * none.3[k]) / (2.0 * h);
+                assert!((slope - slopes[4 * k + b]).abs() < 1e-8, "{k} {b} {slope}");
+                if k >= b {
+                    let bent = weights.dot(&(once.1[k] - none.1[k])) / h;
+                    let off = (hessian[4 * k + b] - bent).abs();
+                    assert!(off < 0.1 * most, "{k} {b} {bent} {}", hessian[4 * k + b]);
+                }
+            }
+        }
+    }
+}

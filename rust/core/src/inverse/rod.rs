@@ -26,7 +26,7 @@ use crate::status::Status;
 /// Buffers of a solve and the tensions it found.
 #[derive(Clone, Debug)]
 pub struct RodWorkspace<'a> {
-    pull: Pull<'a>,
+    pub(super) pull: Pull<'a>,
     search: Search<'a>,
     guess: Option<constant_curvature::Workspace<'a>>,
     bends: Vec<Vector2<f64>>,
@@ -330,7 +330,7 @@ impl<'a> RodInverse<'a> {
     }
 }
 
-impl<'a> Inverter for RodInverse<'a> {
+impl Inverter for RodInverse<'_> {
     type Start = State;
     type Work<'w>
         = RodWorkspace<'w>
@@ -367,12 +367,11 @@ impl<'a> Inverter for RodInverse<'a> {
     /// The start is a shape with its tensions.
     fn solve(&self, target: &Target, start: Option<&State>, work: &mut RodWorkspace<'_>) -> Answer {
         work.pull.forget();
-        let given = match start {
-            Some(state) => work.pull.pulled.begin(state),
-            None => {
-                work.pull.pulled.rest();
-                false
-            }
+        let given = if let Some(state) = start {
+            work.pull.pulled.begin(state)
+        } else {
+            work.pull.pulled.rest();
+            false
         };
         self.search(target, given, self.effort(self.settings.starts), work)
     }
