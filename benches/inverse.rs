@@ -169,7 +169,8 @@ fn rod_tips(robot: &Robot, plan: &rod::Plan, count: usize) -> Vec<Pose> {
     let mut draws = ChaCha8Rng::seed_from_u64(4);
     let (model, mut work) = (Rod::new(robot, plan), rod::Workspace::default());
     let mut tip = || {
-        let mut pull = |k: usize| if k % 3 == 0 { 0.0 } else { draws.random_range(0.0..4400.0) };
+        let mut pull =
+            |k: usize| if k.is_multiple_of(3) { 0.0 } else { draws.random_range(0.0..4400.0) };
         let tensions: Vec<f64> = (0..9).map(&mut pull).collect();
         let report = model.solve_tensions(&tensions, &mut work).unwrap();
         assert_eq!(report.status, Status::Converged);

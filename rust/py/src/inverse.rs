@@ -90,7 +90,7 @@ enum Plans<'a> {
 
 /// An inverse of one of the models.
 enum Engine<'a> {
-    Arcs(ConstantCurvatureInverse<'a>),
+    Arcs(Box<ConstantCurvatureInverse<'a>>),
     Rod(Box<RodInverse<'a>>),
 }
 
@@ -130,7 +130,8 @@ impl<'a> Plans<'a> {
         let robot: &tdcr::robot::Robot = &robot.get().0;
         match self {
             Self::Arcs(plan) => {
-                ConstantCurvatureInverse::new(robot, plan, &bounds, search).map(Engine::Arcs)
+                let inverse = ConstantCurvatureInverse::new(robot, plan, &bounds, search);
+                inverse.map(|inverse| Engine::Arcs(Box::new(inverse)))
             }
             Self::Rod(plan) => {
                 let inverse = RodInverse::new(robot, plan, &bounds, search);
@@ -223,7 +224,7 @@ pub(crate) fn _inverse(
     let target = one_target(target)?;
     match &engine {
         Engine::Arcs(inverse) => {
-            invert_one(py, inverse, &target, start, soon(inverse.settings(), 1))
+            invert_one(py, &**inverse, &target, start, soon(inverse.settings(), 1))
         }
         Engine::Rod(inverse) => {
             invert_one(py, &**inverse, &target, start, soon(inverse.settings(), ROD))
@@ -320,7 +321,7 @@ pub(crate) fn _inverse_batch<'py>(
     };
     let pool = pool.as_deref();
     match &engine {
-        Engine::Arcs(inverse) => invert_many(py, inverse, &targets, start, pool, progress),
+        Engine::Arcs(inverse) => invert_many(py, &**inverse, &targets, start, pool, progress),
         Engine::Rod(inverse) => invert_many(py, &**inverse, &targets, start, pool, progress),
     }
 }
