@@ -7,8 +7,9 @@ use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::answer::{Answer, tell};
 use super::bounds::{Bounds, Space};
-use super::constant_curvature::{self, Answer, ConstantCurvatureInverse, arc_to, tell};
+use super::constant_curvature::{self, ConstantCurvatureInverse, arc_to};
 use super::pull::Pull;
 use super::rows::Inverter;
 use super::search::{Effort, Found, Search};
@@ -294,7 +295,8 @@ impl<'a> RodInverse<'a> {
         let trace: f64 = (0..count).map(|k| matrix[k * (count + 1)]).sum();
         (0..count).for_each(|k| matrix[k * (count + 1)] += RIDGE * trace);
         let mut program = Bounded::default();
-        program.solve(&matrix, &right, &vec![0.0; count], |_| false);
+        // What it leaves when it does not end is a start too.
+        let _ = program.solve(&matrix, &right, &vec![0.0; count], |_| false);
         point.clear();
         point.extend(program.step.iter().zip(&self.units).map(|(tension, unit)| tension / unit));
     }
