@@ -1,4 +1,4 @@
-//! The inverse of the constant-curvature model. Every bench checks its answers first.
+//! The inverses of the constant-curvature model and of the rod. Every bench checks its answers first.
 //!
 //! One iteration of `pose` and `position` is 64 random targets for three segments with nine tendons, of
 //! `path` 1,000 poses along a smooth curve. Times over 10,000 targets are printed while it sets up.
@@ -14,7 +14,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tdcr::Status;
@@ -23,11 +23,13 @@ use tdcr::constant_curvature::{
     Arc, ConstantCurvature, ConstantCurvatureSettings, Plan, Workspace, displacements,
 };
 use tdcr::inverse::{
-    Bounds, ConstantCurvatureInverse, InverseSettings, Range, Target, invert_path,
+    Bounds, ConstantCurvatureInverse, InverseSettings, Inverter, Range, RodInverse, Target,
+    invert_path,
 };
 use tdcr::lie::{Pose, so3};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
+use tdcr::rod::{self, Rod, RodSettings};
 
 const LENGTHS: [f64; 3] = [0.06, 0.0625, 0.064];
 
@@ -51,9 +53,9 @@ fn bounds(extensible: bool) -> Bounds {
     let shortest = if extensible { 0.8 * LENGTHS[0] } else { LENGTHS[0] };
     let [low, high] = [0.8, 1.25].map(|share| LENGTHS.map(|l| share * l).to_vec());
     Bounds {
-        displacement: None,
         curvature: range(vec![0.0], vec![PI / shortest]),
         length: if extensible { range(low, high) } else { None },
+        ..Bounds::default()
     }
 }
 
@@ -162,5 +164,70 @@ fn benches(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(all, benches);
+/// Tips of shapes with two of three tendons of every segment pulled.
+fn rod_tips(robot: &Robot, plan: &rod::Plan, count: usize) -> Vec<Pose> {
+    let mut draws = ChaCha8Rng::seed_from_u64(4);
+    let (model, mut work) = (Rod::new(robot, plan), rod::Workspace::default());
+    let mut tip = || {
+        let mut pull =
+            |k: usize| if k.is_multiple_of(3) { 0.0 } else { draws.random_range(0.0..4400.0) };
+        let tensions: Vec<f64> = (0..9).map(&mut pull).collect();
+        let report = model.solve_tensions(&tensions, &mut work).unwrap();
+        assert_eq!(report.status, Status::Converged);
+        *model.state(&work).frames.last().unwrap()
+    };
+    (0..count).map(|_| tip()).collect()
+}
+
+fn rods(c: &mut Criterion) {
+    let mut group = c.benchmark_group("inverse_rod");
+    let robot = robot();
+    let plan = rod::Plan::new(&robot, RodSettings::default()).unwrap();
+    let inverse =
+        RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default()).unwrap();
+    let tips = rod_tips(&robot, &plan, 64);
+    let (model, mut forward) = (Rod::new(&robot, &plan), rod::Workspace::default());
+    let mut work = inverse.buffers(None);
+    for posed in [true, false] {
+        let of = |tip: &Pose| {
+            if posed { Target::frame(tip) } else { Target::Position(tip.translation) }
+        };
+        let targets: Vec<Target> = tips.iter().map(of).collect();
+        for target in &targets {
+            let answer = inverse.solve(target, None, &mut work);
+            assert_eq!(answer.status, Status::Converged);
+            let mut displacements = [0.0; 9];
+            inverse.write_displacements(&work, &mut displacements);
+            model.solve(&displacements, &mut forward).unwrap();
+            let tip = model.state(&forward).frames.last().unwrap().translation;
+            assert!((tip - target.position()).norm() < 1e-8);
+        }
+        group.throughput(Throughput::Elements(64));
+        let name = if posed { "pose" } else { "position" };
+        group.bench_function(format!("{name}/64_targets"), |b| {
+            b.iter(|| {
+                for target in &targets {
+                    black_box(inverse.solve(black_box(target), None, &mut work));
+                }
+            });
+        });
+    }
+    let from = tips[0].translation;
+    let turn = |k: usize| {
+        let (sin, cos) = (TAU * k as f64 / 1000.0).sin_cos();
+        Target::Position(from + Vector3::new(cos - 1.0, sin, -0.0005 * k as f64) * 0.01)
+    };
+    let targets: Vec<Target> = (0..1000).map(turn).collect();
+    let control = Control::default();
+    let rows = invert_path(&inverse, &targets, None, &control).unwrap();
+    assert!(rows.answers.iter().all(|a| a.status == Status::Converged));
+    assert!(rows.answers[1..].iter().all(|a| a.starts == 1));
+    group.throughput(Throughput::Elements(1000));
+    group.bench_function("path/1000_positions", |b| {
+        b.iter(|| invert_path(&inverse, black_box(&targets), None, &control));
+    });
+    group.finish();
+}
+
+criterion_group!(all, benches, rods);
 criterion_main!(all);

@@ -686,11 +686,14 @@ class Bounds:
         cls,
         *,
         displacement: tuple[_Floats, _Floats] | None = None,
+        tension: tuple[_Floats, _Floats] | None = None,
         curvature: _Floats | None = None,
         length: tuple[_Floats, _Floats] | None = None,
     ) -> Self: ...
     @property
     def displacement(self) -> tuple[Any, Any] | None: ...
+    @property
+    def tension(self) -> tuple[Any, Any] | None: ...
     @property
     def curvature(self) -> float | tuple[float, ...] | None: ...
     @property
@@ -786,19 +789,19 @@ def _inverse(
     model: str,
     start: ArrayLike | None,
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
-    settings: LinkageSettings | ConstantCurvatureSettings | None,
+    settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None,
     search: InverseSettings | None,
     method: str,
-) -> tuple[_Array, Status, str, float, float, int, int]: ...
+) -> tuple[_Array, _Array, Status, str, float, float, int, int]: ...
 def _inverse_solutions(
     robot: Robot,
     target: ArrayLike,
     model: str,
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
-    settings: LinkageSettings | ConstantCurvatureSettings | None,
+    settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None,
     search: InverseSettings | None,
     method: str,
-) -> list[tuple[tuple[_Array, Status, str, float, float, int, int], int]]: ...
+) -> list[tuple[tuple[_Array, _Array, Status, str, float, float, int, int], int]]: ...
 def _inverse_batch(
     robot: Robot,
     targets: ArrayLike,
@@ -806,7 +809,7 @@ def _inverse_batch(
     model: str,
     start: ArrayLike | None,
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
-    settings: LinkageSettings | ConstantCurvatureSettings | None,
+    settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None,
     search: InverseSettings | None,
     method: str,
     threads: int | None,

@@ -35,7 +35,7 @@ def inverse(
     robot: Robot,
     target: ArrayLike,
     *,
-    model: str,
+    model: str = "rod",
     start: ArrayLike | Inverse | Shape | None = None,
     method: Method = "newton",
     bounds: BoundsLike | None = None,
@@ -45,15 +45,19 @@ def inverse(
     """Find displacements that bring the tool to a target.
 
     Descents (damped least squares with the exact Jacobian) from many starts inside the bounds, the
-    same ones every time; the first that meets the target wins. For a single segment the first start
-    is the closed form. Freedom that the target leaves goes to the least bending energy.
+    same ones every time; the first that meets the target wins.
+
+    With the rod the unknowns are the tensions: none becomes negative, and every tendon is as long
+    as its way through the robot, so that none hangs slack. First guesses are those of constant
+    curvature where the routing allows. Freedom that the target leaves goes to the least sum of
+    squared tensions; with constant curvature, to the least bending energy.
 
     Parameters
     ----------
     robot : Robot
     target : array_like, shape (3,) or (4, 4)
         Where the tool (``robot.tool``) should be, world frame [m]: a position, or a frame.
-    model : {"constant_curvature"}
+    model : {"rod", "constant_curvature"}, optional
     method : {"newton", "pso"}, optional
         "newton" descends from guessed and random starts, and from where a swarm settles as the last
         resort; "pso" from where particle swarms settle.
@@ -61,7 +65,7 @@ def inverse(
         Displacements to try first, as along a path [m].
     bounds : Bounds or (lower, upper), optional
         What may be used; a pair bounds displacements [m].
-    settings : ConstantCurvatureSettings, optional
+    settings : RodSettings or ConstantCurvatureSettings, optional
         Those of the model.
     search : InverseSettings, optional
         Tolerances, weights, number of starts, seed.
@@ -75,7 +79,7 @@ def inverse(
     ------
     InvalidInput
         A target that is not finite or no rigid motion, bounds or a start that do not fit the robot,
-        a model without inverse.
+        a model without inverse, proportional tendons.
 
     Examples
     --------
@@ -86,6 +90,10 @@ def inverse(
     >>> answer = tdcr.inverse(robot, there, model="constant_curvature")
     >>> answer.status, (answer.displacements * 1e3).round(6).tolist()
     (<Status.converged: 'converged'>, [-2.0, -2.0, 4.0])
+    >>> pulled = tdcr.forward(robot, [-0.003, float("inf"), float("inf")])
+    >>> answer = tdcr.inverse(robot, pulled.positions[-1])
+    >>> answer.status, (answer.displacements * 1e3).round(6).tolist()
+    (<Status.converged: 'converged'>, [-3.0, 1.495313, 1.495313])
     """
     search = InverseSettings() if search is None else search
     bounds = _bounds(bounds)
@@ -115,8 +123,10 @@ def inverse_solutions(
 
     Parameters
     ----------
-    robot, target, model, method, bounds, settings, search
+    robot, target, method, bounds, settings, search
         As for `inverse`.
+    model : {"constant_curvature"}
+        The rod has one answer: that of `inverse`.
 
     Returns
     -------
@@ -137,7 +147,7 @@ def inverse_batch(
     robot: Robot,
     targets: ArrayLike,
     *,
-    model: str,
+    model: str = "rod",
     start: ArrayLike | Inverse | InverseBatch | Shape | None = None,
     method: Method = "newton",
     bounds: BoundsLike | None = None,
@@ -187,7 +197,7 @@ def track(
     robot: Robot,
     targets: ArrayLike,
     *,
-    model: str,
+    model: str = "rod",
     start: ArrayLike | Inverse | Shape | None = None,
     bounds: BoundsLike | None = None,
     settings: Settings | None = None,
@@ -196,8 +206,10 @@ def track(
 ) -> InverseBatch:
     """Follow a path: every target from the answer of the one before.
 
-    A target that cannot be met from there is sought from all starts, and `InverseBatch.starts` says
-    so: the arm may jump between such a row and the one before.
+    With the rod, a step that does not lead to the target, or only by a jump, is divided: the tool
+    moves and turns evenly from where it is to the target. A target that cannot be met so is sought
+    from other starts, all of them or a few of the rod's, and `InverseBatch.starts` says so: the arm
+    may jump between such a row and the one before.
 
     Parameters
     ----------

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
         InverseSettings,
         LinkageSettings,
         Robot,
+        RodSettings,
         Shape,
     )
 
-    Settings: TypeAlias = LinkageSettings | ConstantCurvatureSettings
+    Settings: TypeAlias = RodSettings | LinkageSettings | ConstantCurvatureSettings
     Array: TypeAlias = NDArray[np.float64]
     Method: TypeAlias = Literal["newton", "pso"]
 
@@ -42,8 +43,11 @@ class Inverse(Value):
     """A position (3,) or a frame (4, 4), world frame [m]."""
     displacements: Array
     """Tendon displacements, (K,) [m]: negative pulls."""
+    tensions: Array
+    """Tensions, (K,), in the units of `Shape.tensions`; NaN with constant curvature."""
     status: Status
-    """converged: the target is met, with the least bending energy nearby where there is freedom;
+    """converged: the target is met, with the least bending energy (rod: the least sum of squared
+    tensions) nearby where there is freedom;
     unreachable: the nearest answer that was found; infeasible: the bounds exclude each other;
     iteration_limit, numerical_error: stopped before either."""
     message: str
@@ -73,7 +77,9 @@ class Inverse(Value):
 
     @cached_property
     def shape(self) -> Shape:
-        """The robot under the displacements."""
+        """The robot under the displacements; the rod under the tensions, which they go with."""
+        if self.model == "rod":
+            return _core.forward(self.robot, tensions=self.tensions, settings=self.settings)
         return _core.forward(
             self.robot, self.displacements, model=self.model, settings=self.settings
         )
@@ -109,6 +115,8 @@ class InverseBatch(Value, Sequence[Inverse]):
     """Positions (B, 3) or frames (B, 4, 4), world frame [m]."""
     displacements: Array
     """Tendon displacements, (B, K) [m]."""
+    tensions: Array
+    """Tensions, (B, K), in the units of `Shape.tensions`; NaN with constant curvature."""
     status: NDArray[Any]
     """`Status` of every row, (B,)."""
     ok: NDArray[np.bool_]
@@ -143,6 +151,7 @@ class InverseBatch(Value, Sequence[Inverse]):
             self.robot,
             self.targets[i],
             self.displacements[i],
+            self.tensions[i],
             self.status[i],
             self._message(i),
             float(self.error[i]),

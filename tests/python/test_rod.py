@@ -449,7 +449,11 @@ def drawn(tensions, **keywords):
             "got NaN for tendon 't0' in row 1",
             lambda: tdcr.forward_batch(trunk(), [[0, 0], [np.nan, 0]], warm=True),
         ),
-        ("model", '"constant_curvature"', lambda: tdcr.inverse(trunk(), [0, 0, 0.2], model="rod")),
+        (
+            "model",
+            '"constant_curvature"',
+            lambda: tdcr.inverse_solutions(trunk(), [0, 0, 0.2], model="rod"),
+        ),
         ("subsegment", '"arc" or "link"', lambda: tdcr.RodSettings(subsegment="bar")),
         ("tendons", '"sliding" or "prop', lambda: tdcr.RodSettings(tendons="glued")),
         ("elements", "1 to 100", lambda: tdcr.RodSettings(elements=0)),

@@ -189,6 +189,7 @@ fn active_bounds_are_kept() {
                 let (low, high) = (length.map(|l| l.0).to_vec(), length.map(|l| l.1).to_vec());
                 Range::new("l", low, high).unwrap()
             }),
+            tension: None,
         };
         let settings = InverseSettings { starts: 20, ..InverseSettings::default() };
         let (answer, found, given) = solve(&robot, &plan, &bounds, settings, &target);
@@ -227,7 +228,7 @@ fn contradictory_bounds_are_infeasible() {
     let target = Target::Position(Vector3::new(0.05, 0.0, 0.1));
     let range = |low: Vec<f64>, high: Vec<f64>| Some(Range::new("b", low, high).unwrap());
     let of = |displacement, curvature| {
-        let bounds = Bounds { displacement, curvature, length: None };
+        let bounds = Bounds { displacement, curvature, ..Bounds::default() };
         solve(&robot, &plan, &bounds, settings, &target).0
     };
     // Three that would all have to be pulled; a bend beyond the curvature.
@@ -242,8 +243,7 @@ fn contradictory_bounds_are_infeasible() {
     // Whatever was solved before, the answer describes its own arcs.
     let mut pulled = vec![0.05; 9];
     pulled[..3].fill(-0.001);
-    let bounds =
-        Bounds { displacement: range(vec![-0.05; 9], pulled), curvature: None, length: None };
+    let bounds = Bounds { displacement: range(vec![-0.05; 9], pulled), ..Bounds::default() };
     let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings).unwrap();
     let mut work = inverse.workspace();
     let first = inverse.solve(&target, None, &mut work);

@@ -22,6 +22,7 @@ mod design_routing;
 mod inverse;
 mod inverse_bounds;
 mod inverse_common;
+mod inverse_rod;
 mod lie;
 mod linkage_bars;
 mod linkage_chain;

@@ -147,7 +147,7 @@ impl Problem<3> for Curved {
         residual.amax() < 1e-11
     }
 
-    fn add_hessian(&self, weights: &SVector<f64, 3>, hessian: &mut [f64]) {
+    fn add_hessian(&mut self, _: &[f64], weights: &SVector<f64, 3>, hessian: &mut [f64]) {
         let sum: Matrix4<f64> = (0..3).map(|k| self.square[k] * weights[k]).sum();
         for (i, j) in (0..SIZE).flat_map(|i| (0..=i).map(move |j| (i, j))) {
             hessian[i * SIZE + j] += sum[(i, j)];

@@ -18,10 +18,14 @@ use crate::convert::{invalid, list_text, one_or_tuple, type_name};
 /// ----------
 /// displacement : (lower, upper), optional
 ///     Of tendon displacements [m]: numbers, or sequences with one value per tendon. Negative pulls;
-///     infinite is no bound. The only tendon of a segment is never released: shapes that leave its
-///     segment straight are not sought.
+///     infinite is no bound. Constant curvature never releases the only tendon of a segment: shapes
+///     that leave its segment straight are not sought.
+/// tension : (lower, upper), optional
+///     Of tensions, for the rod, in the units of `Shape.tensions`: numbers, or sequences with one value
+///     per tendon. A lower bound above 0 keeps tendons taut.
 /// curvature : float or sequence of float, optional
-///     Largest curvature, one value or one per segment [1/m]. No segment turns by more than a full turn.
+///     Largest curvature, one value or one per segment [1/m], for constant curvature. No segment turns
+///     by more than a full turn.
 /// length : (lower, upper), optional
 ///     Of the lengths of extensible segments [m]: numbers, or sequences with one value per segment.
 ///     Default: half to twice the rest length.
@@ -36,7 +40,7 @@ pub(crate) struct Bounds(pub(crate) core::Bounds);
 
 impl Hash for Bounds {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        for range in [&self.0.displacement, &self.0.curvature, &self.0.length] {
+        for range in [&self.0.displacement, &self.0.tension, &self.0.curvature, &self.0.length] {
             let values = range.as_ref().map(Range::values);
             for value in values.into_iter().flat_map(|(lower, upper)| lower.iter().chain(upper)) {
                 (value + 0.0).to_bits().hash(state);
@@ -79,9 +83,10 @@ impl Bounds {
 #[pymethods]
 impl Bounds {
     #[new]
-    #[pyo3(signature = (*, displacement=None, curvature=None, length=None))]
+    #[pyo3(signature = (*, displacement=None, tension=None, curvature=None, length=None))]
     fn new(
         displacement: Option<&Bound<'_, PyAny>>,
+        tension: Option<&Bound<'_, PyAny>>,
         curvature: Option<&Bound<'_, PyAny>>,
         length: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
@@ -98,6 +103,7 @@ impl Bounds {
         };
         Ok(Self(core::Bounds {
             displacement: pair("displacement", displacement)?,
+            tension: pair("tension", tension)?,
             curvature: curvature.map(largest).transpose()?,
             length: pair("length", length)?,
         }))
@@ -107,6 +113,12 @@ impl Bounds {
     #[getter]
     fn displacement<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyTuple>>> {
         pair(py, self.0.displacement.as_ref())
+    }
+
+    /// Lowest and highest tensions, or None.
+    #[getter]
+    fn tension<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyTuple>>> {
+        pair(py, self.0.tension.as_ref())
     }
 
     /// Largest curvatures [1/m], or None.
@@ -133,10 +145,12 @@ impl Bounds {
         };
         let displacement =
             self.0.displacement.as_ref().map(|range| format!("displacement={}", both(range)));
+        let tension = self.0.tension.as_ref().map(|range| format!("tension={}", both(range)));
         let curvature =
             self.0.curvature.as_ref().map(|range| format!("curvature={}", text(range.values().1)));
         let length = self.0.length.as_ref().map(|range| format!("length={}", both(range)));
-        let given: Vec<String> = [displacement, curvature, length].into_iter().flatten().collect();
+        let given: Vec<String> =
+            [displacement, tension, curvature, length].into_iter().flatten().collect();
         format!("Bounds({})", given.join(", "))
     }
 
@@ -146,6 +160,7 @@ impl Bounds {
     ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
         let keywords = PyDict::new(py);
         keywords.set_item("displacement", self.displacement(py)?)?;
+        keywords.set_item("tension", self.tension(py)?)?;
         keywords.set_item("curvature", self.curvature(py)?)?;
         keywords.set_item("length", self.length(py)?)?;
         Ok((PyTuple::empty(py), keywords))

@@ -1,19 +1,21 @@
 //! The engines of `inverse`, `inverse_batch`, `track` and `inverse_solutions`; their docstrings are in
 //! Python.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix4, Vector3};
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use rayon::ThreadPool;
 use tdcr::batch::pool;
-use tdcr::constant_curvature::{Arc, ConstantCurvature, Plan, Workspace};
 use tdcr::inverse::{
-    Answer, ConstantCurvatureInverse, InverseRows, Method, Target, invert_path, invert_rows,
+    Answer, ConstantCurvatureInverse, InverseRows, Inverter, Method, RodInverse, Target,
+    invert_path, invert_rows,
 };
-use tdcr::model::Model;
 use tdcr::robot::rigid_motion;
-use tdcr::{InvalidInput, Status};
+use tdcr::{InvalidInput, Status, constant_curvature, rod};
 
 use crate::arguments::{optional, whole};
 use crate::bounds::Bounds;
@@ -27,12 +29,15 @@ use crate::settings::InverseSettings;
 /// enough to go without listening for Ctrl-C.
 const SOON: usize = 200_000;
 
-/// Whether it does.
-fn soon(search: &tdcr::inverse::InverseSettings) -> bool {
+/// How many times as long those of the rod take.
+const ROD: usize = 100;
+
+/// Whether it does, by what a step takes.
+fn soon(search: &tdcr::inverse::InverseSettings, each: usize) -> bool {
     let starts = if search.method == Method::Swarm { search.starts } else { 1 };
     let swarms = search.swarm.particles.saturating_mul(search.swarm.max_iterations);
     let steps = search.starts.saturating_mul(search.max_iterations);
-    steps.saturating_add(swarms.saturating_mul(starts)) <= SOON
+    steps.saturating_add(swarms.saturating_mul(starts)).saturating_mul(each) <= SOON
 }
 
 /// One target from its numbers: 3 of a position or 16 of a frame.
@@ -77,26 +82,44 @@ fn many_targets(value: &Bound<'_, PyAny>) -> PyResult<Vec<Target>> {
     .collect()
 }
 
-/// What all calls share.
-struct Problem<'a> {
-    inverse: ConstantCurvatureInverse<'a>,
-    robot: &'a tdcr::robot::Robot,
-    plan: &'a Plan,
+/// The model's knowledge of a robot, which an inverse refers to.
+enum Plans<'a> {
+    Arcs(&'a constant_curvature::Plan),
+    Rod(Arc<rod::Plan>),
 }
 
-impl<'a> Problem<'a> {
+/// An inverse of one of the models.
+enum Engine<'a> {
+    Arcs(Box<ConstantCurvatureInverse<'a>>),
+    Rod(Box<RodInverse<'a>>),
+}
+
+impl<'a> Plans<'a> {
     fn new(
         robot: &'a Bound<'_, Robot>,
         model: &str,
         settings: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        match Choice::new(model, settings)? {
+            Choice::ConstantCurvature(settings) => {
+                robot.get().constant_curvature_plan(settings).map(Self::Arcs)
+            }
+            Choice::Rod(settings) => robot.get().rod_plan(settings).map(Self::Rod),
+            Choice::Linkage(_) => {
+                let expected = "a model with an inverse (\"rod\" or \"constant_curvature\")";
+                Err(InvalidInput::new("model", expected, format!("\"{model}\"")))
+            }
+        }
+        .map_err(|e| invalid(&e))
+    }
+
+    fn engine(
+        &'a self,
+        robot: &'a Bound<'_, Robot>,
         bounds: Option<&Bound<'_, PyAny>>,
         search: Option<&Bound<'_, InverseSettings>>,
         method: &str,
-    ) -> PyResult<Self> {
-        let Choice::ConstantCurvature(settings) = Choice::new(model, settings)? else {
-            let expected = "a model with an inverse (\"constant_curvature\")";
-            return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
-        };
+    ) -> PyResult<Engine<'a>> {
         let bounds = Bounds::extract(bounds)?;
         let mut search = search.map_or_else(Default::default, |search| search.get().0);
         let Some(method) = Method::ALL.into_iter().find(|known| known.as_str() == method) else {
@@ -104,61 +127,75 @@ impl<'a> Problem<'a> {
             return Err(invalid(&InvalidInput::new("method", "\"newton\" or \"pso\"", got)));
         };
         search.method = method;
-        let plan = robot.get().constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
         let robot: &tdcr::robot::Robot = &robot.get().0;
-        let inverse = ConstantCurvatureInverse::new(robot, plan, &bounds, search);
-        Ok(Self { inverse: inverse.map_err(|e| invalid(&e))?, robot, plan })
-    }
-
-    /// The arcs of a start given as displacements.
-    fn arcs(&self, argument: &str, displacements: &[f64]) -> PyResult<Vec<Arc>> {
-        let mut work = Workspace::default();
-        let model = ConstantCurvature::new(self.robot, self.plan);
-        self.robot
-            .check_displacements(displacements)
-            .and_then(|()| model.solve(displacements, &mut work))
-            .map_err(|error| invalid(&InvalidInput { argument: argument.to_owned(), ..error }))?;
-        Ok(work.arcs().to_vec())
-    }
-
-    fn one_start(&self, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<Arc>>> {
-        let Some(value) = value else { return Ok(None) };
-        let array = float_array("start", value)?;
-        let tendons = self.robot.tendons().len();
-        if array.shape() != [tendons] {
-            let expected = format!("displacements of shape ({tendons},)");
-            return Err(wrong_shape("start", &expected, array.shape()));
+        match self {
+            Self::Arcs(plan) => {
+                let inverse = ConstantCurvatureInverse::new(robot, plan, &bounds, search);
+                inverse.map(|inverse| Engine::Arcs(Box::new(inverse)))
+            }
+            Self::Rod(plan) => {
+                let inverse = RodInverse::new(robot, plan, &bounds, search);
+                inverse.map(|inverse| Engine::Rod(Box::new(inverse)))
+            }
         }
-        self.arcs("start", values(&array)?).map(Some)
-    }
-
-    fn many_starts(
-        &self,
-        rows: usize,
-        value: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Vec<Vec<Arc>>> {
-        let Some(value) = value else { return Ok(Vec::new()) };
-        let array = float_array("start", value)?;
-        let tendons = self.robot.tendons().len();
-        if array.shape() == [tendons] {
-            return Ok(vec![self.arcs("start", values(&array)?)?; rows]);
-        }
-        if array.shape() != [rows, tendons] {
-            let expected = format!("displacements of shape ({tendons},) or ({rows}, {tendons})");
-            return Err(wrong_shape("start", &expected, array.shape()));
-        }
-        let given = values(&array)?.chunks_exact(tendons.max(1));
-        given.enumerate().map(|(row, d)| self.arcs(&format!("start[{row}]"), d)).collect()
+        .map_err(|e| invalid(&e))
     }
 }
 
-/// (displacements, status, message, error, `rotation_error`, iterations, starts)
-type Row = (Py<PyAny>, Py<PyAny>, String, f64, f64, usize, usize);
+/// A start from displacements.
+fn begin<I: Inverter>(inverse: &I, argument: &str, displacements: &[f64]) -> PyResult<I::Start> {
+    inverse
+        .start(displacements)
+        .map_err(|error| invalid(&InvalidInput { argument: argument.to_owned(), ..error }))
+}
 
-fn row(py: Python<'_>, displacements: Vec<f64>, answer: &Answer, message: String) -> PyResult<Row> {
+fn one_start<I: Inverter>(
+    inverse: &I,
+    value: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<I::Start>> {
+    let Some(value) = value else { return Ok(None) };
+    let array = float_array("start", value)?;
+    let tendons = inverse.robot().tendons().len();
+    if array.shape() != [tendons] {
+        let expected = format!("displacements of shape ({tendons},)");
+        return Err(wrong_shape("start", &expected, array.shape()));
+    }
+    begin(inverse, "start", values(&array)?).map(Some)
+}
+
+fn many_starts<I: Inverter>(
+    inverse: &I,
+    rows: usize,
+    value: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<I::Start>> {
+    let Some(value) = value else { return Ok(Vec::new()) };
+    let array = float_array("start", value)?;
+    let tendons = inverse.robot().tendons().len();
+    if array.shape() == [tendons] {
+        return Ok(vec![begin(inverse, "start", values(&array)?)?; rows]);
+    }
+    if array.shape() != [rows, tendons] {
+        let expected = format!("displacements of shape ({tendons},) or ({rows}, {tendons})");
+        return Err(wrong_shape("start", &expected, array.shape()));
+    }
+    let given = values(&array)?.chunks_exact(tendons.max(1)).enumerate();
+    given.map(|(row, d)| begin(inverse, &format!("start[{row}]"), d)).collect()
+}
+
+/// (displacements, tensions, status, message, error, `rotation_error`, iterations, starts)
+type Row = (Py<PyAny>, Py<PyAny>, Py<PyAny>, String, f64, f64, usize, usize);
+
+fn row(
+    py: Python<'_>,
+    displacements: Vec<f64>,
+    tensions: Vec<f64>,
+    answer: &Answer,
+    message: String,
+) -> PyResult<Row> {
     let tendons = displacements.len();
     Ok((
         frozen(py, displacements, &[tendons])?,
+        frozen(py, tensions, &[tendons])?,
         status(py, answer.status)?.unbind(),
         message,
         answer.distance,
@@ -182,22 +219,44 @@ pub(crate) fn _inverse(
     search: Option<&Bound<'_, InverseSettings>>,
     method: &str,
 ) -> PyResult<Row> {
-    let problem = Problem::new(robot, model, settings, bounds, search, method)?;
+    let plans = Plans::new(robot, model, settings)?;
+    let engine = plans.engine(robot, bounds, search, method)?;
     let target = one_target(target)?;
-    let start = problem.one_start(start)?;
-    let inverse = &problem.inverse;
-    let solve = |mut work: tdcr::inverse::Workspace<'_>| {
-        let answer = inverse.solve(&target, start.as_deref(), &mut work);
-        let mut displacements = vec![0.0; problem.robot.tendons().len()];
+    match &engine {
+        Engine::Arcs(inverse) => {
+            invert_one(py, &**inverse, &target, start, soon(inverse.settings(), 1))
+        }
+        Engine::Rod(inverse) => {
+            invert_one(py, &**inverse, &target, start, soon(inverse.settings(), ROD))
+        }
+    }
+}
+
+fn invert_one<I: Inverter>(
+    py: Python<'_>,
+    inverse: &I,
+    target: &Target,
+    start: Option<&Bound<'_, PyAny>>,
+    soon: bool,
+) -> PyResult<Row>
+where
+    I::Start: Send,
+{
+    let start = one_start(inverse, start)?;
+    let solve = |mut work: I::Work<'_>| {
+        let answer = inverse.solve(target, start.as_ref(), &mut work);
+        let mut displacements = vec![f64::NAN; inverse.robot().tendons().len()];
+        let mut tensions = displacements.clone();
         inverse.write_displacements(&work, &mut displacements);
-        (displacements, answer, inverse.message(&answer, &work))
+        inverse.write_tensions(&work, &mut tensions);
+        (displacements, tensions, answer, inverse.message(&answer, &work))
     };
-    let (displacements, answer, message) = if soon(inverse.settings()) {
-        py.detach(|| solve(inverse.workspace()))
+    let (displacements, tensions, answer, message) = if soon {
+        py.detach(|| solve(inverse.buffers(None)))
     } else {
-        long_call::run(py, None, |control| solve(inverse.workspace().stopped_by(&control.stop)))?
+        long_call::run(py, None, |control| solve(inverse.buffers(Some(&control.stop))))?
     };
-    row(py, displacements, &answer, message)
+    row(py, displacements, tensions, &answer, message)
 }
 
 /// All answers of one target, least bending energy first, each with the number of starts that led there.
@@ -213,15 +272,20 @@ pub(crate) fn _inverse_solutions(
     search: Option<&Bound<'_, InverseSettings>>,
     method: &str,
 ) -> PyResult<Vec<(Row, usize)>> {
-    let problem = Problem::new(robot, model, settings, bounds, search, method)?;
+    let plans = Plans::new(robot, model, settings)?;
+    let engine = plans.engine(robot, bounds, search, method)?;
+    let Engine::Arcs(inverse) = &engine else {
+        let expected = "\"constant_curvature\" for all answers (inverse has one of the rod)";
+        return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
+    };
     let target = one_target(target)?;
-    let inverse = &problem.inverse;
     let solutions = long_call::run(py, None, |control| {
         inverse.solutions_in(&target, &mut inverse.workspace().stopped_by(&control.stop))
     })?;
     let rows = solutions.iter().map(|solution| {
+        let unknown = vec![f64::NAN; solution.displacements.len()];
         Ok((
-            row(py, solution.displacements.clone(), &solution.answer, String::new())?,
+            row(py, solution.displacements.clone(), unknown, &solution.answer, String::new())?,
             solution.hits,
         ))
     });
@@ -246,31 +310,55 @@ pub(crate) fn _inverse_batch<'py>(
     progress: Option<&Bound<'py, PyAny>>,
     chain: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let problem = Problem::new(robot, model, settings, bounds, search, method)?;
+    let plans = Plans::new(robot, model, settings)?;
+    let engine = plans.engine(robot, bounds, search, method)?;
     let targets = many_targets(targets)?;
-    let inverse = &problem.inverse;
-    let answers = if chain {
-        let start = problem.one_start(start)?;
-        long_call::run(py, progress, |control| {
-            invert_path(inverse, &targets, start.as_deref(), control)
-        })?
+    let pool = if chain {
+        None
     } else {
         let threads = optional("threads", threads, whole)?;
-        let pool = pool(threads).map_err(|e| invalid(&e))?;
-        let starts = problem.many_starts(targets.len(), start)?;
+        Some(pool(threads).map_err(|e| invalid(&e))?)
+    };
+    let pool = pool.as_deref();
+    match &engine {
+        Engine::Arcs(inverse) => invert_many(py, &**inverse, &targets, start, pool, progress),
+        Engine::Rod(inverse) => invert_many(py, &**inverse, &targets, start, pool, progress),
+    }
+}
+
+/// On a pool each alone, without one as a path.
+fn invert_many<'py, I: Inverter>(
+    py: Python<'py>,
+    inverse: &I,
+    targets: &[Target],
+    start: Option<&Bound<'py, PyAny>>,
+    pool: Option<&ThreadPool>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>>
+where
+    I::Start: Send,
+{
+    let answers = if let Some(pool) = pool {
+        let starts = many_starts(inverse, targets.len(), start)?;
         long_call::run(py, progress, |control| {
-            invert_rows(inverse, &targets, &starts, &pool, control)
+            invert_rows(inverse, targets, &starts, pool, control)
+        })?
+    } else {
+        let start = one_start(inverse, start)?;
+        long_call::run(py, progress, |control| {
+            invert_path(inverse, targets, start.as_ref(), control)
         })?
     };
     // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
-    export(py, answers.unwrap_or_default(), problem.robot.tendons().len())
+    export(py, answers.unwrap_or_default(), inverse.robot().tendons().len())
 }
 
 fn export(py: Python<'_>, rows: InverseRows, tendons: usize) -> PyResult<Bound<'_, PyDict>> {
-    let InverseRows { displacements, answers } = rows;
+    let InverseRows { displacements, tensions, answers } = rows;
     let count = [answers.len()];
     let columns = PyDict::new(py);
     columns.set_item("displacements", frozen(py, displacements, &[answers.len(), tendons])?)?;
+    columns.set_item("tensions", frozen(py, tensions, &[answers.len(), tendons])?)?;
     let mut statuses = Vec::with_capacity(answers.len());
     for answer in &answers {
         statuses.push(status(py, answer.status)?.unbind());

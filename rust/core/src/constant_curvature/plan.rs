@@ -52,6 +52,11 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
+    /// Its subsegments.
+    pub(crate) fn range(&self) -> std::ops::Range<usize> {
+        self.first..self.last
+    }
+
     /// Bending energy over half the squared angle \[J, or 1/m in units of EI\].
     pub(crate) fn stiffness(&self, robot: &Robot) -> f64 {
         let backbone = robot.backbone();

@@ -55,7 +55,12 @@ impl Range {
         (&self.lower, &self.upper)
     }
 
-    fn check(&self, argument: &str, count: usize, per: &str) -> Result<(), InvalidInput> {
+    pub(super) fn check(
+        &self,
+        argument: &str,
+        count: usize,
+        per: &str,
+    ) -> Result<(), InvalidInput> {
         for length in [self.lower.len(), self.upper.len()] {
             if length != 1 && length != count {
                 let expected = format!("1 or {count} values, one per {per}");
@@ -71,6 +76,8 @@ impl Range {
 pub struct Bounds {
     /// Of tendon displacements \[m\].
     pub displacement: Option<Range>,
+    /// Of tensions, where the model has some, in the unit of its results; 0 and more.
+    pub tension: Option<Range>,
     /// Largest curvature of every segment \[1/m\].
     pub curvature: Option<Range>,
     /// Length of every extensible segment \[m\]; default half to twice the rest length.
@@ -87,14 +94,20 @@ const STRAIGHT: f64 = 1e-9;
 /// No segment becomes shorter than this share of its rest length.
 const SHORTEST: f64 = 1e-3;
 
+/// Where unknowns may be.
+#[derive(Clone, Debug)]
+pub(super) struct Space {
+    pub(super) region: Region,
+    /// The box of swarms, beyond which descents may lead.
+    pub(super) lower: Vec<f64>,
+    pub(super) upper: Vec<f64>,
+}
+
 /// The region of the unknowns of `Chain`, and where random starts are drawn.
 #[derive(Clone, Debug)]
 pub(super) struct Reach {
-    pub(super) region: Region,
-    /// The box of swarms: that of the region, but for turns beyond half a one, to which descents may
-    /// lead.
-    pub(super) lower: Vec<f64>,
-    pub(super) upper: Vec<f64>,
+    /// Swarms turn no segment by more than half a turn.
+    pub(super) space: Space,
     /// Per segment.
     pub(super) draws: Vec<Draw>,
     /// Freedoms that the tendons have and the bounds leave.
@@ -132,9 +145,7 @@ impl Reach {
         });
         let (lower, upper) = sides.unzip();
         let mut reach = Self {
-            region: Region::new(size),
-            lower,
-            upper,
+            space: Space { region: Region::new(size), lower, upper },
             draws,
             freedoms: 0,
             ranges,
@@ -151,7 +162,7 @@ impl Reach {
 
     /// What is no freedom: directions that no tendon moves, straight segments, values held by equal bounds.
     fn equate(&mut self, plan: &Plan) {
-        let (width, size) = (plan.width(), self.region.size());
+        let (width, size) = (plan.width(), self.space.region.size());
         let mut equations: Vec<(Vec<f64>, f64)> = Vec::new();
         for direction in plan.unmoved() {
             let normal: Vec<f64> = (0..size).map(|j| direction[j] * plan.unit(j)).collect();
@@ -174,7 +185,7 @@ impl Reach {
         let matrix = DMatrix::from_fn(equations.len(), size, |row, j| equations[row].0[j]);
         self.freedoms = null_space(&matrix).len();
         for (normal, value) in &equations {
-            self.region.equate(normal, *value);
+            self.space.region.equate(normal, *value);
         }
     }
 
@@ -183,12 +194,12 @@ impl Reach {
         if plan.width() == 2 || draw.shortest == draw.longest {
             return;
         }
-        let mut normal = unit(self.region.size(), 3 * i + 2);
-        if self.region.bound(&normal, bounds.longest(plan, i)) {
+        let mut normal = unit(self.space.region.size(), 3 * i + 2);
+        if self.space.region.bound(&normal, bounds.longest(plan, i)) {
             self.labels.0.push(format!("longest segment {i}"));
         }
         normal[3 * i + 2] = -1.0;
-        if self.region.bound(&normal, -draw.shortest) {
+        if self.space.region.bound(&normal, -draw.shortest) {
             self.labels.0.push(format!("shortest segment {i}"));
         }
     }
@@ -202,26 +213,26 @@ impl Reach {
         let scale = (plan.width() == 3).then_some(first + 2);
         // Without stretch the smaller of two circles is all there is.
         if radius < if scale.is_some() { f64::INFINITY } else { TURN } {
-            self.region.add_disc(Disc { first, radius, scale });
+            self.space.region.add_disc(Disc { first, radius, scale });
             self.labels.1.push(format!("curvature of segment {i}"));
             if scale.is_none() {
                 return;
             }
         }
-        self.region.add_disc(Disc { first, radius: TURN, scale: None });
+        self.space.region.add_disc(Disc { first, radius: TURN, scale: None });
         self.labels.1.push(format!("full turn of segment {i}"));
     }
 
     fn bound_displacements(&mut self, plan: &Plan, names: &[String]) {
         for (k, (lower, upper)) in self.ranges.iter().enumerate().filter(|(_, (l, u))| l < u) {
             let (mut row, at_rest) = displacement(plan, k);
-            if self.region.bound(&row, upper + at_rest) {
+            if self.space.region.bound(&row, upper + at_rest) {
                 self.labels.0.push(format!("release of '{}'", names[k]));
             }
             for entry in &mut row {
                 *entry = -*entry;
             }
-            if self.region.bound(&row, -lower - at_rest) {
+            if self.space.region.bound(&row, -lower - at_rest) {
                 self.labels.0.push(format!("pull of '{}'", names[k]));
             }
         }
@@ -229,7 +240,7 @@ impl Reach {
 
     /// The bounds that hold a point back.
     pub(super) fn holding(&self, point: &[f64]) -> Vec<&str> {
-        let (bounds, discs) = self.region.at_edge(point, 1e-9);
+        let (bounds, discs) = self.space.region.at_edge(point, 1e-9);
         let bounds = bounds.into_iter().map(|k| self.labels.0[k].as_str());
         bounds.chain(discs.into_iter().map(|k| self.labels.1[k].as_str())).collect()
     }
@@ -257,6 +268,10 @@ impl Bounds {
             ("bounds.length", &self.length, count, "segment"),
         ] {
             range.as_ref().map_or(Ok(()), |range| range.check(argument, count, per))?;
+        }
+        if self.tension.is_some() {
+            let expected = "no bounds on tension: constant curvature knows no forces";
+            return Err(InvalidInput::new("bounds.tension", expected, "bounds"));
         }
         if let Some(range) = &self.curvature
             && (0..count).any(|i| range.at(i).0 > 0.0)
@@ -301,10 +316,37 @@ impl Bounds {
         Draw { widest, shortest, longest }
     }
 
+    /// Checks them for a rod.
+    pub(super) fn check_rod(&self, tendons: usize) -> Result<(), InvalidInput> {
+        for (argument, range) in
+            [("bounds.displacement", &self.displacement), ("bounds.tension", &self.tension)]
+        {
+            range.as_ref().map_or(Ok(()), |range| range.check(argument, tendons, "tendon"))?;
+        }
+        for (argument, range) in
+            [("bounds.curvature", &self.curvature), ("bounds.length", &self.length)]
+        {
+            if range.is_some() {
+                let expected = "none for model \"rod\" (bounds on displacement and tension)";
+                return Err(InvalidInput::new(argument, expected, "bounds"));
+            }
+        }
+        let Some(range) = &self.tension else { return Ok(()) };
+        (0..tendons).find(|k| range.at(*k).1 < 0.0).map_or(Ok(()), |k| {
+            let expected = "upper bounds of 0 or more: tendons only pull";
+            Err(InvalidInput::new("bounds.tension", expected, format!("{:?}", range.at(k).1)))
+        })
+    }
+
+    /// Lowest and highest displacement that is asked for \[m\].
+    pub(super) fn displacement_of(&self, k: usize) -> (f64, f64) {
+        let free = (f64::NEG_INFINITY, f64::INFINITY);
+        self.displacement.as_ref().map_or(free, |range| range.at(k))
+    }
+
     /// Lowest and highest displacement of a tendon \[m\].
     fn displacements(&self, plan: &Plan, k: usize) -> (f64, f64) {
-        let free = (f64::NEG_INFINITY, f64::INFINITY);
-        let (lower, upper) = self.displacement.as_ref().map_or(free, |range| range.at(k));
+        let (lower, upper) = self.displacement_of(k);
         // The only tendon of a segment cannot push: released, it does not count.
         let lone = plan.segments().any(|segment| segment.own == [k]);
         (lower, if lone { upper.min(0.0) } else { upper })

@@ -1,17 +1,15 @@
 //! A chain of arcs before a target: residuals of the tool, their derivatives, the bending energy.
 
-use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
+use nalgebra::{Vector2, Vector3, Vector6};
 
 use crate::constant_curvature::Plan;
 use crate::constant_curvature::bent::Bent;
-use crate::lie::{Pose, so3};
+use crate::lie::Pose;
 use crate::robot::Robot;
 use crate::solve::fit::Problem;
 
-use super::{InverseSettings, Target};
-
-/// How much of the robot's length one radian counts, unless it is said; and all of the tool.
-const RADIAN: f64 = 0.3;
+use super::InverseSettings;
+use super::aim::{Aim, Twist};
 
 /// Unknowns, base first: for every segment its bending vector \[rad\] and, if it is extensible, its length
 /// over its rest length.
@@ -19,13 +17,7 @@ const RADIAN: f64 = 0.3;
 pub(crate) struct Chain<'a> {
     robot: &'a Robot,
     plan: &'a Plan,
-    target: Target,
-    settings: &'a InverseSettings,
-    /// The base's rotation, where weights along world axes differ.
-    axes: Option<Matrix3<f64>>,
-    /// Weights of the residuals over the robot's reach: position along world axes, rotation about tool
-    /// axes.
-    weights: Vector6<f64>,
+    pub(super) aim: Aim<'a>,
     /// Stiffness of every segment's bending vector, of mean 1.
     stiffness: Vec<f64>,
     bents: Vec<Bent>,
@@ -33,80 +25,25 @@ pub(crate) struct Chain<'a> {
     lengths: Vec<f64>,
     /// Frame of every segment's base and of the last tip.
     frames: Vec<Pose>,
-    /// Place of the tool.
-    tool: Vector3<f64>,
-    /// Rotation from the tool to the target, tool axes.
-    error: Vector3<f64>,
-    /// From angular velocity (world axes) to the change of `error`, but for the sign.
-    back: Matrix3<f64>,
     /// Velocity of the tool and angular velocity by every unknown.
-    columns: Vec<(Vector3<f64>, Vector3<f64>)>,
+    columns: Vec<Twist>,
 }
 
 impl<'a> Chain<'a> {
     pub(crate) fn new(robot: &'a Robot, plan: &'a Plan, settings: &'a InverseSettings) -> Self {
-        let tool = robot.tool().translation.norm();
-        let reach = robot.backbone().total_length() + tool;
-        let default = RADIAN * robot.backbone().total_length() + tool;
-        let radian = settings.rotation_weight.map(|w| w.unwrap_or(default) / reach);
-        let [x, y, z] = settings.position_weight.map(|w| w / reach);
         let count = plan.segments().len();
         let stiffness: Vec<f64> = plan.segments().map(|s| s.stiffness(robot)).collect();
         let mean = stiffness.iter().sum::<f64>() / count as f64;
         Self {
             robot,
             plan,
-            target: Target::Position(Vector3::zeros()),
-            settings,
-            axes: (x != y || y != z).then(|| robot.base().rotation),
-            weights: Vector6::new(x, y, z, radian[0], radian[1], radian[2]),
+            aim: Aim::new(robot, settings),
             stiffness: stiffness.iter().map(|s| s / mean).collect(),
             bents: Vec::with_capacity(count),
             lengths: Vec::with_capacity(count),
             frames: Vec::with_capacity(count + 1),
-            tool: Vector3::zeros(),
-            error: Vector3::zeros(),
-            back: Matrix3::zeros(),
             columns: Vec::with_capacity(3 * count),
         }
-    }
-
-    /// Everything is in the frame of the base: the world's origin may be far away.
-    pub(crate) fn aim(&mut self, target: Target) {
-        let world = self.robot.base().inverse();
-        self.target = match target {
-            Target::Position(position) => {
-                let off = position - self.robot.base().translation;
-                Target::Position(world.rotation * off)
-            }
-            Target::Pose(pose) => {
-                let off = pose.translation - self.robot.base().translation;
-                let rotation = world.rotation * pose.rotation;
-                Target::Pose(Pose { rotation, translation: world.rotation * off })
-            }
-        };
-    }
-
-    /// A vector in the axes that its weights are for.
-    fn weighed(&self, v: &Vector3<f64>) -> Vector3<f64> {
-        self.axes.map_or(*v, |axes| axes * v)
-    }
-
-    /// Number of residuals that count.
-    pub(crate) fn rows(&self) -> usize {
-        let given = if self.target.rotation().is_some() { 6 } else { 3 };
-        self.weights.iter().take(given).filter(|weight| **weight > 0.0).count()
-    }
-
-    /// Distance \[m\] and angle \[rad\] by which the tool misses the target at the point evaluated last, over
-    /// the axes that count; 0 for the angle to a position.
-    pub(crate) fn misses(&self) -> (f64, f64) {
-        let counts = |weight: f64, value: f64| if weight > 0.0 { value * value } else { 0.0 };
-        let off = self.weighed(&(self.target.position() - self.tool));
-        let sum = |offset: usize, v: &Vector3<f64>| {
-            (0..3).map(|k| counts(self.weights[offset + k], v[k])).sum::<f64>().sqrt()
-        };
-        (sum(0, &off), if self.target.rotation().is_some() { sum(3, &self.error) } else { 0.0 })
     }
 
     /// Places every segment.
@@ -126,19 +63,8 @@ impl<'a> Chain<'a> {
             self.lengths.push(length);
             self.frames.push(frame);
         }
-        self.tool = frame.transform(&self.robot.tool().translation);
-        if let Some(wanted) = self.target.rotation() {
-            let tool = frame.rotation * self.robot.tool().rotation;
-            self.error = so3::log(&(tool.transpose() * wanted));
-            self.back = so3::left_jacobian_inverse(&self.error) * tool.transpose();
-        }
-    }
-
-    /// Residuals of the last placing.
-    fn residual(&self) -> Vector6<f64> {
-        let off = self.weighed(&(self.target.position() - self.tool));
-        let turn = if self.target.rotation().is_some() { self.error } else { Vector3::zeros() };
-        Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z).component_mul(&self.weights)
+        let tool = self.robot.tool();
+        self.aim.place(frame.transform(&tool.translation), || frame.rotation * tool.rotation);
     }
 
     /// Derivatives of the tool's place and rotation by every unknown.
@@ -147,7 +73,7 @@ impl<'a> Chain<'a> {
         for (i, segment) in self.plan.segments().enumerate() {
             let (bent, length) = (&self.bents[i], self.lengths[i]);
             let base = self.frames[i].rotation;
-            let lever = self.tool - self.frames[i + 1].translation;
+            let lever = self.aim.tool - self.frames[i + 1].translation;
             for (moved, turned) in bent.moved().iter().zip(bent.turned()) {
                 let spin = base * turned;
                 self.columns.push((base * (moved * length) + spin.cross(&lever), spin));
@@ -162,7 +88,7 @@ impl<'a> Chain<'a> {
     fn within(&self, i: usize) -> [[(Vector3<f64>, Vector3<f64>); 3]; 3] {
         let second = self.bents[i].second();
         let base = self.frames[i].rotation;
-        let lever = self.tool - self.frames[i + 1].translation;
+        let lever = self.aim.tool - self.frames[i + 1].translation;
         let (length, rest) = (self.lengths[i], self.plan.segment(i).rest_length);
         let spins = self.bents[i].turned().map(|turned| base * turned);
         let moved = self.bents[i].moved();
@@ -184,53 +110,29 @@ impl Problem<6> for Chain<'_> {
     fn evaluate(&mut self, z: &[f64], residual: &mut Vector6<f64>, jacobian: &mut [Vector6<f64>]) {
         self.place(z);
         self.differentiate();
-        *residual = self.residual();
-        let rotates = self.target.rotation().is_some();
-        let axes = self.axes;
-        for (column, (velocity, spin)) in jacobian.iter_mut().zip(&self.columns) {
-            let turned = if rotates { self.back * spin } else { Vector3::zeros() };
-            let velocity = axes.map_or(*velocity, |axes| axes * velocity);
-            for k in 0..3 {
-                column[k] = -self.weights[k] * velocity[k];
-                column[k + 3] = -self.weights[k + 3] * turned[k];
-            }
-        }
+        *residual = self.aim.residual();
+        self.aim.write_columns(&self.columns, jacobian);
     }
 
     fn squared(&mut self, z: &[f64]) -> f64 {
         self.place(z);
-        self.residual().norm_squared()
+        self.aim.residual().norm_squared()
     }
 
     fn met(&self, residual: &Vector6<f64>) -> bool {
-        // Not by `misses`: the point evaluated last may be another.
-        let sum = |rows: std::ops::Range<usize>| {
-            let counted = rows.filter(|k| self.weights[*k] > 0.0);
-            counted.map(|k| (residual[k] / self.weights[k]).powi(2)).sum::<f64>().sqrt()
-        };
-        sum(0..3) <= self.settings.position_tolerance
-            && sum(3..6) <= self.settings.rotation_tolerance
+        self.aim.met(residual)
     }
 
-    fn add_hessian(&self, weights: &Vector6<f64>, hessian: &mut [f64]) {
+    fn add_hessian(&mut self, _: &[f64], weights: &Vector6<f64>, hessian: &mut [f64]) {
         let width = self.plan.width();
         let size = self.columns.len();
-        let push = -weights.component_mul(&self.weights);
-        let force: Vector3<f64> = push.fixed_rows::<3>(0).into();
-        let force = self.axes.map_or(force, |axes| axes.tr_mul(&force));
-        let twist: Vector3<f64> = push.fixed_rows::<3>(3).into();
-        let rotates = self.target.rotation().is_some();
-        // In world axes, as `back` carries it.
-        let moment = if rotates { self.back.transpose() * twist } else { Vector3::zeros() };
-        let tool = self.frames[self.frames.len() - 1].rotation * self.robot.tool().rotation;
-        let bends = |spin: &Vector3<f64>| {
-            so3::left_jacobian_inverse_derivative(&self.error, &(tool.transpose() * spin))
-        };
+        let rotates = self.aim.rotates();
+        let push = self.aim.curvature(weights);
         for i in 0..size / width {
             let own = self.within(i);
             for a in width * i..width * (i + 1) {
                 let (velocity, spin) = &self.columns[a];
-                let row = twist.transpose() * bends(spin);
+                let row = push.row(spin);
                 for b in 0..=a {
                     let other = &self.columns[b].1;
                     // The proximal unknown turns all that the distal one does.
@@ -239,10 +141,9 @@ impl Problem<6> for Chain<'_> {
                     } else {
                         (other.cross(velocity), other.cross(spin))
                     };
-                    let mut sum = force.dot(&moved);
+                    let mut sum = push.force.dot(&moved);
                     if rotates {
-                        sum += moment.dot(&(turned - other.cross(spin)));
-                        sum -= (row * (self.back * other))[0];
+                        sum += push.rotation(&row, spin, other, push.moment.dot(&turned));
                     }
                     hessian[a * size + b] += sum;
                 }
@@ -279,8 +180,10 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
+    use super::super::Target;
     use super::*;
     use crate::constant_curvature::ConstantCurvatureSettings;
+    use crate::lie::so3;
     use crate::robot::{Backbone, BackboneSpec, PerDisk, Routing, Tendon};
 
     fn robot(placed: bool) -> Robot {
@@ -346,7 +249,7 @@ mod tests {
             let off = axis * if case % 3 == 0 { 1e-6 } else { u(0.0, 3.0) };
             largest = largest.max(off.norm());
             let translation = tip.translation + Vector3::from_fn(|_, _| u(-0.1, 0.1));
-            chain.aim(if posed {
+            chain.aim.at(if posed {
                 Target::Pose(Pose { rotation: tip.rotation * so3::exp(&off), translation })
             } else {
                 Target::Position(translation)
@@ -362,7 +265,7 @@ mod tests {
             let (mut residual, mut jacobian) = (Vector6::zeros(), vec![Vector6::zeros(); size]);
             chain.evaluate(z, &mut residual, &mut jacobian);
             let mut hessian = vec![0.0; size * size];
-            chain.add_hessian(weights, &mut hessian);
+            chain.add_hessian(z, weights, &mut hessian);
             (residual, jacobian, hessian)
         };
         let (_, jacobian, hessian) = at(z);

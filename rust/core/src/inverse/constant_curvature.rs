@@ -1,5 +1,6 @@
 //! The inverse of the constant-curvature model.
 
+use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
 use std::sync::atomic::AtomicBool;
 
@@ -7,31 +8,18 @@ use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::answer::{Answer, tell};
 use super::bounds::{Bounds, Draw, Reach};
 use super::chain::Chain;
+use super::rows::Inverter;
 use super::search::{Effort, Found, Search};
 use super::{InverseSettings, Method, Target};
-use crate::constant_curvature::{Arc, Plan};
+use crate::constant_curvature::{self, Arc, ConstantCurvature, ConstantCurvatureSettings, Plan};
 use crate::error::InvalidInput;
+use crate::model::Model;
 use crate::robot::Robot;
 use crate::solve::fit::Problem;
 use crate::status::Status;
-
-/// How an inverse ended; the arcs are in the workspace.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
-    /// Converged: the target is met, with the least bending energy nearby where there is freedom.
-    /// Unreachable: the nearest pose that the starts led to. Infeasible: the bounds exclude each other.
-    pub status: Status,
-    /// Distance from the tool to the target over the axes that count \[m\].
-    pub distance: f64,
-    /// Angle from the tool to the target over the axes that count \[rad\]; 0 for a position.
-    pub angle: f64,
-    /// Steps taken from all starts.
-    pub iterations: usize,
-    /// Starts tried.
-    pub starts: usize,
-}
 
 /// Buffers of a solve and the arcs it found.
 #[derive(Clone, Debug)]
@@ -53,7 +41,7 @@ impl<'a> Workspace<'a> {
 #[derive(Clone, Debug)]
 pub struct ConstantCurvatureInverse<'a> {
     robot: &'a Robot,
-    plan: &'a Plan,
+    plan: Cow<'a, Plan>,
     settings: InverseSettings,
     reach: Reach,
 }
@@ -71,7 +59,43 @@ impl<'a> ConstantCurvatureInverse<'a> {
     ) -> Result<Self, InvalidInput> {
         settings.validate()?;
         let reach = Reach::new(plan, bounds, robot.tendon_names())?;
-        Ok(Self { robot, plan, settings, reach })
+        Ok(Self { robot, plan: Cow::Borrowed(plan), settings, reach })
+    }
+
+    /// For first guesses of another model, without bounds: none where the routing is none for arcs.
+    pub(super) fn guessing(robot: &'a Robot, settings: &InverseSettings) -> Option<Self> {
+        let plan = Plan::new(robot, ConstantCurvatureSettings::default()).ok()?;
+        let settings = InverseSettings {
+            position_tolerance: settings.position_tolerance.max(GUESS),
+            rotation_tolerance: settings.rotation_tolerance.max(GUESS),
+            method: Method::Newton,
+            least_energy: false,
+            ..*settings
+        };
+        let reach = Reach::new(&plan, &Bounds::default(), robot.tendon_names()).ok()?;
+        Some(Self { robot, plan: Cow::Owned(plan), settings, reach })
+    }
+
+    /// The bending vector of every subsegment where the k-th few starts lead, met or not.
+    pub(super) fn guess(
+        &self,
+        target: &Target,
+        k: usize,
+        work: &mut Workspace<'_>,
+        bends: &mut Vec<Vector2<f64>>,
+    ) {
+        work.chain.aim.at(*target);
+        let effort = self.effort(&work.chain, FEW);
+        let effort = Effort { first: FEW * k, fall_back: false, nearest: false, ..effort };
+        work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| {
+            self.begin(target, k, point);
+        });
+        let lengths = self.robot.backbone().lengths();
+        bends.clear();
+        for (segment, q) in self.plan.segments().zip(work.search.point.chunks_exact(2)) {
+            let bend = Vector2::new(q[0], q[1]) / segment.rest_length;
+            bends.extend(lengths[segment.range()].iter().map(|length| bend * *length));
+        }
     }
 
     /// The robot it was prepared from.
@@ -90,7 +114,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
     #[must_use]
     pub fn workspace(&self) -> Workspace<'_> {
         Workspace {
-            chain: Chain::new(self.robot, self.plan, &self.settings),
+            chain: Chain::new(self.robot, &self.plan, &self.settings),
             search: Search::default(),
         }
     }
@@ -102,7 +126,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         start: Option<&[Arc]>,
         work: &mut Workspace<'_>,
     ) -> Answer {
-        work.chain.aim(*target);
+        work.chain.aim.at(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
         let usable = |arcs: &&[Arc]| {
             let sound = |arc: &Arc| arc.bend.amax() < FAR && arc.length.is_finite();
@@ -110,24 +134,25 @@ impl<'a> ConstantCurvatureInverse<'a> {
         };
         let start = start.filter(usable);
         let given = usize::from(start.is_some());
-        let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| match start {
-            Some(arcs) if k == 0 => self.unknowns(arcs, point),
-            _ => self.start(target, k - given, point),
-        });
+        let found =
+            work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| match start {
+                Some(arcs) if k == 0 => self.unknowns(arcs, point),
+                _ => self.begin(target, k - given, point),
+            });
         Self::answer(found, &work.chain)
     }
 
     /// Seeks again from where the last solve in `work` ended, as along a path; from other starts only when
     /// that fails.
     pub fn follow(&self, target: &Target, work: &mut Workspace<'_>) -> Answer {
-        if work.search.point.len() != self.reach.region.size() {
+        if work.search.point.len() != self.reach.space.region.size() {
             return self.solve(target, None, work);
         }
-        work.chain.aim(*target);
+        work.chain.aim.at(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
-        let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| {
+        let found = work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| {
             if k > 0 {
-                self.start(target, k - 1, point);
+                self.begin(target, k - 1, point);
             }
         });
         Self::answer(found, &work.chain)
@@ -143,16 +168,16 @@ impl<'a> ConstantCurvatureInverse<'a> {
     /// The same in given buffers.
     #[must_use]
     pub fn solutions_in(&self, target: &Target, work: &mut Workspace<'_>) -> Vec<Solution> {
-        work.chain.aim(*target);
+        work.chain.aim.at(*target);
         let mut distinct: Vec<(Vec<f64>, Solution)> = Vec::new();
-        let mut slope = vec![0.0; self.reach.region.size()];
+        let mut slope = vec![0.0; self.reach.space.region.size()];
         for k in 0..self.settings.starts {
             if work.search.stopped() {
                 break;
             }
             let effort = Effort { first: k, ..self.effort(&work.chain, 1) };
-            let found = work.search.run(&mut work.chain, &self.reach, effort, |k, point| {
-                self.start(target, k, point);
+            let found = work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| {
+                self.begin(target, k, point);
             });
             if found.status != Status::Converged {
                 continue;
@@ -181,15 +206,16 @@ impl<'a> ConstantCurvatureInverse<'a> {
             first: 0,
             starts,
             max_iterations: self.settings.max_iterations,
-            redundant: self.settings.least_energy && self.reach.freedoms > chain.rows(),
+            redundant: self.settings.least_energy && self.reach.freedoms > chain.aim.rows(),
             method: self.settings.method,
             fall_back: self.settings.method == Method::Newton && starts > 1,
+            nearest: true,
             swarm: &self.settings.swarm,
         }
     }
 
     fn answer(found: Found, chain: &Chain<'_>) -> Answer {
-        let (distance, angle) = chain.misses();
+        let (distance, angle) = chain.aim.misses();
         let Found { status, iterations, starts } = found;
         Answer { status, distance, angle, iterations, starts }
     }
@@ -208,39 +234,14 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// The displacements that give the robot the arcs that the last solve in `work` found \[m\].
     pub fn write_displacements(&self, work: &Workspace<'_>, place: &mut [f64]) {
-        self.reach.write_displacements(self.plan, &work.search.point, place);
+        self.reach.write_displacements(&self.plan, &work.search.point, place);
     }
 
     /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
     #[must_use]
     pub fn message(&self, answer: &Answer, work: &Workspace<'_>) -> String {
-        let Answer { distance, angle, .. } = *answer;
-        let angle = if angle > 0.0 { format!(" and {angle:.2e} rad") } else { String::new() };
-        let off = format!("{distance:.2e} m{angle} off the target");
         let held = self.reach.holding(&work.search.point);
-        let held = if held.is_empty() {
-            String::new()
-        } else {
-            format!("; at its bound: {}", held.join(", "))
-        };
-        match answer.status {
-            Status::Converged => String::new(),
-            Status::Unreachable => {
-                format!("the nearest answer of {} starts is {off}{held}", answer.starts)
-            }
-            Status::Infeasible => "the bounds leave the robot no shape".to_owned(),
-            Status::IterationLimit if self.meets(answer) => {
-                "the target is met, but not with the least bending energy nearby".to_owned()
-            }
-            Status::IterationLimit | Status::NumericalError => {
-                format!("stopped before a nearest answer was found: {off}{held}")
-            }
-        }
-    }
-
-    fn meets(&self, answer: &Answer) -> bool {
-        answer.distance <= self.settings.position_tolerance
-            && answer.angle <= self.settings.rotation_tolerance
+        tell(answer, &self.settings, &held, "bending energy")
     }
 
     fn unknowns(&self, arcs: &[Arc], point: &mut Vec<f64>) {
@@ -255,7 +256,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// The k-th start: one arc to the target, which is the answer for a single segment; nearly straight;
     /// then random ones, each from its own stream.
-    fn start(&self, target: &Target, k: usize, point: &mut Vec<f64>) {
+    fn begin(&self, target: &Target, k: usize, point: &mut Vec<f64>) {
         point.clear();
         match k {
             0 => self.single_arc(target, point),
@@ -321,7 +322,11 @@ impl<'a> ConstantCurvatureInverse<'a> {
 /// plane; what it is off along the plane, i, is as if the radius were less by i: at half the angle h, with
 /// `q = (r - i) sin h + tool_z cos h`, `point - tool` is at `2 q sin h` across and `point` at
 /// `2 q cos h - tool_z` along z.
-fn arc_to(point: &Vector3<f64>, tool: &Vector3<f64>, wanted: f64) -> (Vector2<f64>, f64) {
+pub(super) fn arc_to(
+    point: &Vector3<f64>,
+    tool: &Vector3<f64>,
+    wanted: f64,
+) -> (Vector2<f64>, f64) {
     let off = (point - tool).xy();
     let (across, along) = (off.norm(), point.z + tool.z);
     let direction = if across > 0.0 { off / across } else { Vector2::x() };
@@ -336,6 +341,59 @@ fn arc_to(point: &Vector3<f64>, tool: &Vector3<f64>, wanted: f64) -> (Vector2<f6
     let (near, far) = (arc(1.0), arc(-1.0));
     // A negative length is no arc.
     if far.1 > 0.0 && (far.1 - wanted).abs() < (near.1 - wanted).abs() { far } else { near }
+}
+
+/// What a first guess may miss \[m, rad\], and its starts.
+const GUESS: f64 = 1e-6;
+const FEW: usize = 8;
+
+impl Inverter for ConstantCurvatureInverse<'_> {
+    type Start = Vec<Arc>;
+    type Work<'w>
+        = Workspace<'w>
+    where
+        Self: 'w;
+
+    fn robot(&self) -> &Robot {
+        self.robot
+    }
+
+    fn settings(&self) -> &InverseSettings {
+        &self.settings
+    }
+
+    fn start(&self, displacements: &[f64]) -> Result<Vec<Arc>, InvalidInput> {
+        self.robot.check_displacements(displacements)?;
+        let mut work = constant_curvature::Workspace::default();
+        ConstantCurvature::new(self.robot, &self.plan).solve(displacements, &mut work)?;
+        Ok(work.arcs().to_vec())
+    }
+
+    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Workspace<'w> {
+        let work = self.workspace();
+        match stop {
+            Some(stop) => work.stopped_by(stop),
+            None => work,
+        }
+    }
+
+    fn solve(&self, target: &Target, start: Option<&Vec<Arc>>, work: &mut Workspace<'_>) -> Answer {
+        Self::solve(self, target, start.map(Vec::as_slice), work)
+    }
+
+    fn follow(&self, target: &Target, work: &mut Workspace<'_>) -> Answer {
+        Self::follow(self, target, work)
+    }
+
+    fn write_displacements(&self, work: &Workspace<'_>, place: &mut [f64]) {
+        Self::write_displacements(self, work, place);
+    }
+
+    fn write_tensions(&self, _: &Workspace<'_>, _: &mut [f64]) {}
+
+    fn message(&self, answer: &Answer, work: &Workspace<'_>) -> String {
+        Self::message(self, answer, work)
+    }
 }
 
 /// A start that turns further than this is none \[rad\].

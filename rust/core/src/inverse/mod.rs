@@ -1,11 +1,16 @@
 //! From where the tool should be to tendon displacements.
 //!
 //! [`ConstantCurvatureInverse`] finds the arcs by descents from many starts ([`crate::solve::fit`]),
-//! inside bounds, and spends what freedom is left on the least bending energy.
+//! inside bounds, and spends what freedom is left on the least bending energy; [`RodInverse`] finds tensions
+//! likewise, none below zero, and spends it on the least of them.
 
+mod aim;
+mod answer;
 mod bounds;
 mod chain;
 mod constant_curvature;
+mod pull;
+mod rod;
 mod rows;
 mod search;
 mod settings;
@@ -13,9 +18,11 @@ mod swarm;
 
 use nalgebra::{Matrix3, Vector3};
 
+pub use answer::Answer;
 pub use bounds::{Bounds, Range};
-pub use constant_curvature::{Answer, ConstantCurvatureInverse, Solution, Workspace};
-pub use rows::{InverseRows, invert_path, invert_rows};
+pub use constant_curvature::{ConstantCurvatureInverse, Solution, Workspace};
+pub use rod::{RodInverse, RodWorkspace};
+pub use rows::{InverseRows, Inverter, invert_path, invert_rows};
 pub use settings::{InverseSettings, Method};
 
 use crate::error::InvalidInput;

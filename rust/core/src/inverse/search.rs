@@ -7,7 +7,7 @@ use crate::solve::pso::{PsoSettings, Swarm};
 use crate::status::Status;
 
 use super::Method;
-use super::bounds::Reach;
+use super::bounds::Space;
 
 /// Ends of descents that are kept as candidates for the nearest point.
 const CANDIDATES: usize = 4;
@@ -26,7 +26,7 @@ pub(super) struct Search<'a> {
     pub(super) stop: Option<&'a AtomicBool>,
     pub(super) swarm: Option<Swarm>,
     /// Where descents ended that did not meet the target, by their squared residual, best first.
-    candidates: Vec<(f64, Vec<f64>)>,
+    pub(super) candidates: Vec<(f64, Vec<f64>)>,
 }
 
 /// How a search ended.
@@ -49,6 +49,8 @@ pub(super) struct Effort<'s> {
     pub(super) method: Method,
     /// A swarm is the last resort.
     pub(super) fall_back: bool,
+    /// The nearest point is wanted where none meets the target.
+    pub(super) nearest: bool,
     pub(super) swarm: &'s PsoSettings,
 }
 
@@ -58,11 +60,11 @@ impl Search<'_> {
     pub(super) fn run<P: Problem<6>>(
         &mut self,
         problem: &mut P,
-        reach: &Reach,
+        space: &Space,
         effort: Effort<'_>,
         start: impl FnMut(usize, &mut Vec<f64>),
     ) -> Found {
-        let (status, starts) = self.seek(problem, reach, effort, start);
+        let (status, starts) = self.seek(problem, space, effort, start);
         if status != Status::Converged {
             self.fit.evaluate(problem, &self.point);
         }
@@ -73,7 +75,7 @@ impl Search<'_> {
     fn seek<P: Problem<6>>(
         &mut self,
         problem: &mut P,
-        reach: &Reach,
+        space: &Space,
         effort: Effort<'_>,
         mut start: impl FnMut(usize, &mut Vec<f64>),
     ) -> (Status, usize) {
@@ -86,48 +88,51 @@ impl Search<'_> {
             let k = effort.first + tried;
             let inside = if effort.method == Method::Newton {
                 start(k, &mut self.point);
-                self.fit.restore(&reach.region, &mut self.point)
+                self.fit.restore(&space.region, &mut self.point)
             } else {
-                self.settle(problem, reach, effort.swarm, k)
+                self.settle(problem, space, effort.swarm, k)
             };
             if !inside {
                 // A start may be too far away to be brought back; the middle of the box is not.
-                if tried == 0 && !self.has_a_point(reach) {
+                if tried == 0 && !self.has_a_point(space) {
                     return (Status::Infeasible, 1);
                 }
                 continue;
             }
-            if let Some(status) = self.descend(problem, reach, effort) {
+            if let Some(status) = self.descend(problem, space, effort) {
                 return (status, tried + 1);
             }
         }
         // A swarm looks where the starts did not.
         if effort.fall_back
-            && self.settle(problem, reach, effort.swarm, 0)
-            && let Some(status) = self.descend(problem, reach, effort)
+            && self.settle(problem, space, effort.swarm, 0)
+            && let Some(status) = self.descend(problem, space, effort)
         {
             return (status, effort.starts);
         }
-        (self.nearest(problem, reach, effort), effort.starts)
+        if !effort.nearest {
+            return (Status::Unreachable, effort.starts);
+        }
+        (self.nearest(problem, space, effort), effort.starts)
     }
 
     /// Whether the region has a point, which is then at hand.
-    fn has_a_point(&mut self, reach: &Reach) -> bool {
+    fn has_a_point(&mut self, space: &Space) -> bool {
         self.point.clear();
-        self.point.extend(reach.lower.iter().zip(&reach.upper).map(|(l, u)| 0.5 * (l + u)));
-        self.fit.restore(&reach.region, &mut self.point)
+        self.point.extend(space.lower.iter().zip(&space.upper).map(|(l, u)| 0.5 * (l + u)));
+        self.fit.restore(&space.region, &mut self.point)
     }
 
     /// Descends from the point at hand: the status if it meets the target.
     fn descend<P: Problem<6>>(
         &mut self,
         problem: &mut P,
-        reach: &Reach,
+        space: &Space,
         effort: Effort<'_>,
     ) -> Option<Status> {
         let limit = effort.max_iterations;
-        match self.fit.descend(problem, &reach.region, &mut self.point, Purpose::Meet, limit) {
-            Ending::Met => return Some(self.spend_freedom(problem, reach, effort)),
+        match self.fit.descend(problem, &space.region, &mut self.point, Purpose::Meet, limit) {
+            Ending::Met => return Some(self.spend_freedom(problem, space, effort)),
             Ending::Failed => {}
             Ending::Stalled | Ending::IterationLimit => self.remember(),
         }
@@ -143,13 +148,13 @@ impl Search<'_> {
     fn spend_freedom<P: Problem<6>>(
         &mut self,
         problem: &mut P,
-        reach: &Reach,
+        space: &Space,
         effort: Effort<'_>,
     ) -> Status {
         if !effort.redundant {
             return Status::Converged;
         }
-        match self.fit.lower_energy(problem, &reach.region, &mut self.point, LOWER) {
+        match self.fit.lower_energy(problem, &space.region, &mut self.point, LOWER) {
             Ending::Met => Status::Converged,
             _ => Status::IterationLimit,
         }
@@ -169,17 +174,17 @@ impl Search<'_> {
     fn nearest<P: Problem<6>>(
         &mut self,
         problem: &mut P,
-        reach: &Reach,
+        space: &Space,
         effort: Effort<'_>,
     ) -> Status {
         let mut best: Option<(f64, Status, Vec<f64>)> = None;
         for (_, mut point) in std::mem::take(&mut self.candidates) {
             let ending =
-                self.fit.descend(problem, &reach.region, &mut point, Purpose::Nearest, POLISH);
+                self.fit.descend(problem, &space.region, &mut point, Purpose::Nearest, POLISH);
             let squared = self.fit.residual.norm_squared();
             if ending == Ending::Met {
                 self.point = point;
-                return self.spend_freedom(problem, reach, effort);
+                return self.spend_freedom(problem, space, effort);
             }
             let status = match ending {
                 Ending::Stalled => Status::Unreachable,

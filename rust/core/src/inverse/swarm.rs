@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::bounds::Reach;
+use super::bounds::Space;
 use super::search::Search;
 use crate::solve::fit::Problem;
 use crate::solve::pso::{Objective, Progress, PsoSettings, Swarm};
@@ -50,18 +50,18 @@ impl Search<'_> {
     pub(super) fn settle<P: Problem<6>>(
         &mut self,
         problem: &mut P,
-        reach: &Reach,
+        space: &Space,
         settings: &PsoSettings,
         round: usize,
     ) -> bool {
         if self.swarm.is_none() {
-            self.swarm = Swarm::new(*settings, &reach.lower, &reach.upper).ok();
+            self.swarm = Swarm::new(*settings, &space.lower, &space.upper).ok();
         }
         let Some(swarm) = &mut self.swarm else { return false };
         swarm.reseed(settings.seed.wrapping_add(round as u64));
         let mut cost = Cost {
             problem,
-            region: &reach.region,
+            region: &space.region,
             inside: Restoring::default(),
             point: Vec::new(),
             stop: self.stop,
@@ -69,6 +69,6 @@ impl Search<'_> {
         let Ok(report) = swarm.run(&mut cost);
         self.point.clear();
         self.point.extend_from_slice(swarm.best());
-        report.value.is_finite() && self.fit.restore(&reach.region, &mut self.point)
+        report.value.is_finite() && self.fit.restore(&space.region, &mut self.point)
     }
 }

@@ -99,6 +99,12 @@ impl Chain {
         self.tensions.resize(plan.rest_lengths.len(), 0.0);
     }
 
+    /// No bounds on lengths: they are what the tensions make them.
+    pub(super) fn unbound(&mut self, plan: &Plan) {
+        self.bounds.clear();
+        self.bounds.resize(plan.rest_lengths.len(), f64::INFINITY);
+    }
+
     /// Whether the solve is to end.
     pub(super) fn stopped(&self) -> bool {
         self.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed))
@@ -268,9 +274,11 @@ impl Chain {
     /// The Newton step at the point assembled last, with a share `ridge` of the Schur complement's trace added
     /// to its diagonal; false when the program has no solution.
     pub(super) fn solve(&mut self, plan: &Plan, ridge: f64) -> bool {
-        if !self.solve_tensions(plan, ridge) {
-            return false;
-        }
+        self.solve_tensions(plan, ridge) && self.bend(plan)
+    }
+
+    /// The step of the strains that goes with the step of the tensions at hand; false unless it is finite.
+    pub(super) fn bend(&mut self, plan: &Plan) -> bool {
         let size = plan.width();
         self.step.clear();
         for i in 0..plan.data.len() {

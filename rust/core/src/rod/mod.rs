@@ -10,10 +10,12 @@ mod model;
 mod nudge;
 mod plan;
 mod proportional;
+pub(crate) mod pulled;
 mod sensitivity;
 mod settings;
 pub(crate) mod stage;
 mod subsegment;
+mod sweep;
 
 pub use model::{Rod, Workspace};
 pub use plan::Plan;

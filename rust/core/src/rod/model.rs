@@ -112,9 +112,7 @@ impl<'r> Rod<'r> {
         self.listen(work);
         let chain = &mut work.chain;
         chain.rest(self.plan);
-        // All free: the lengths are what the tensions make them.
-        chain.bounds.clear();
-        chain.bounds.resize(tensions.len(), f64::INFINITY);
+        chain.unbound(self.plan);
         chain.taut.clear();
         chain.taut.extend(tensions.iter().map(|tension| *tension > 0.0));
         work.reached.clone_from(&chain.strains);

@@ -144,6 +144,11 @@ impl Plan {
         }
     }
 
+    /// How displacements are imposed.
+    pub(crate) fn tendon_rule(&self) -> TendonRule {
+        self.settings.tendons
+    }
+
     /// Rest length of a subsegment \[m\].
     pub(super) fn length(&self, i: usize) -> f64 {
         self.data[i].length * self.settings.elements as f64

@@ -29,9 +29,28 @@ pub trait Problem<const R: usize> {
     /// Whether residuals are as small as wanted.
     fn met(&self, residual: &SVector<f64, R>) -> bool;
 
-    /// Adds the second derivatives of `weights . r` to the lower triangle of a matrix, row by row, at the
-    /// point evaluated last.
-    fn add_hessian(&self, weights: &SVector<f64, R>, hessian: &mut [f64]);
+    /// Adds the second derivatives of `weights . r` to the lower triangle of a matrix, row by row, at `z`,
+    /// the point evaluated last.
+    fn add_hessian(&mut self, z: &[f64], weights: &SVector<f64, R>, hessian: &mut [f64]);
+
+    /// Adds bounds on functions of the unknowns, as rows for a step from the point evaluated last; there are
+    /// none unless this is defined.
+    fn linearize(&self, _rows: &mut Rows) {}
+
+    /// Whether there are any.
+    fn bounded(&self) -> bool {
+        false
+    }
+
+    /// By how much these bounds are violated at the point evaluated last; not above [`WITHIN`] inside.
+    fn violation(&self) -> f64 {
+        0.0
+    }
+
+    /// Share of its terms that the gradient of a Lagrangian is known to.
+    fn precision(&self) -> f64 {
+        STATIONARY
+    }
 
     /// The energy, of order 1, and its gradient.
     fn energy(&self, z: &[f64], gradient: &mut [f64]) -> f64;
@@ -74,6 +93,9 @@ const STUCK: f64 = 1e12;
 const HEADWAY: f64 = 1e-3;
 /// ...and this many of them are a stall.
 const PATIENCE: usize = 5;
+/// Violations of bounds on functions of the unknowns that count as none, and steps to get there.
+pub const WITHIN: f64 = 1e-12;
+const RETURNS: usize = 8;
 /// Weight of rows along which no step is wanted, over the size of the Hessian: enough for strong multipliers,
 /// whose curvature across the rows would otherwise have to be damped away.
 const STIFF: f64 = 100.0;
@@ -147,6 +169,14 @@ impl<const R: usize> Workspace<R> {
     ) -> Ending {
         self.trial_jacobian.resize(region.size(), SVector::zeros());
         self.evaluate(problem, z);
+        if problem.violation() > WITHIN {
+            let (mut residual, mut jacobian) = (self.residual, std::mem::take(&mut self.jacobian));
+            let inside = self.come_back(problem, region, z, &mut residual, &mut jacobian);
+            (self.residual, self.jacobian) = (residual, jacobian);
+            if !inside {
+                return Ending::Failed;
+            }
+        }
         let mut squared = self.residual.norm_squared();
         let (mut damping, mut idle) = (DAMPING, 0);
         self.program.active.clear();
@@ -161,7 +191,7 @@ impl<const R: usize> Workspace<R> {
             if !self.model(problem, region, z, purpose, &mut damping) {
                 return Ending::Failed;
             }
-            if purpose == Purpose::Nearest && self.stationary(squared) {
+            if purpose == Purpose::Nearest && self.stationary(squared, problem.precision()) {
                 return Ending::Stalled;
             }
             let lower = self.accept(problem, region, z, squared);
@@ -171,8 +201,8 @@ impl<const R: usize> Workspace<R> {
                 damping *= 0.2;
             } else {
                 damping = (8.0 * damping).max(1e-9);
-                if purpose == Purpose::Nearest {
-                    // Second derivatives are those of the point evaluated last.
+                if purpose == Purpose::Nearest || problem.bounded() {
+                    // Second derivatives and bounds are those of the point evaluated last.
                     self.evaluate(problem, z);
                 }
             }
@@ -188,7 +218,7 @@ impl<const R: usize> Workspace<R> {
     /// convex.
     fn model<P: Problem<R>>(
         &mut self,
-        problem: &P,
+        problem: &mut P,
         region: &Region,
         z: &[f64],
         purpose: Purpose,
@@ -198,10 +228,11 @@ impl<const R: usize> Workspace<R> {
         self.gauss_newton(size);
         let trace: f64 = (0..size).map(|i| self.hessian[i * (size + 1)]).sum();
         if purpose == Purpose::Nearest {
-            problem.add_hessian(&self.residual, &mut self.hessian);
+            problem.add_hessian(z, &self.residual, &mut self.hessian);
             region.add_curvature(z, &self.program, 0, &mut self.hessian);
             self.rows.clear();
             region.linearize(z, &mut self.rows);
+            problem.linearize(&mut self.rows);
             self.stiffen(size, 0);
         }
         let squared = self.residual.norm_squared();
@@ -224,11 +255,16 @@ impl<const R: usize> Workspace<R> {
         self.trial.clear();
         self.trial.extend(z.iter().zip(&self.program.step).map(|(z, p)| z + p));
         // A point inside satisfies every tangent too.
-        if region.contains(&self.trial) {
+        let inside = region.contains(&self.trial);
+        if inside && !problem.bounded() {
             return true;
         }
         self.rows.clear();
         region.linearize(z, &mut self.rows);
+        problem.linearize(&mut self.rows);
+        if inside && self.rows.allow(size, &self.program.step) {
+            return true;
+        }
         self.program.solve(&self.rows) == Outcome::Solved
     }
 
@@ -283,10 +319,10 @@ impl<const R: usize> Workspace<R> {
     }
 
     /// Whether the gradient of the Lagrangian vanishes.
-    fn stationary(&self, squared: f64) -> bool {
+    fn stationary(&self, squared: f64, precision: f64) -> bool {
         let steepest = self.jacobian.iter().fold(0.0_f64, |most, column| most.max(column.norm()));
         let left = self.program.lagrangian_gradient(&self.rows);
-        left <= steepest * (STATIONARY * squared.sqrt()).max(ROUNDING)
+        left <= steepest * (precision * squared.sqrt()).max(ROUNDING)
     }
 
     /// Takes the model's step if it lowers the squared residual, which is returned.
@@ -305,6 +341,15 @@ impl<const R: usize> Workspace<R> {
             return None;
         }
         problem.evaluate(&self.trial, &mut self.trial_residual, &mut self.trial_jacobian);
+        if problem.violation() > WITHIN {
+            let (mut trial, mut residual) = (std::mem::take(&mut self.trial), self.trial_residual);
+            let mut jacobian = std::mem::take(&mut self.trial_jacobian);
+            let inside = self.come_back(problem, region, &mut trial, &mut residual, &mut jacobian);
+            (self.trial, self.trial_residual, self.trial_jacobian) = (trial, residual, jacobian);
+            if !inside {
+                return None;
+            }
+        }
         let lower = self.trial_residual.norm_squared();
         if lower < squared {
             std::mem::swap(z, &mut self.trial);
@@ -313,5 +358,27 @@ impl<const R: usize> Workspace<R> {
             return Some(lower);
         }
         None
+    }
+
+    /// Brings a point back inside the problem's own bounds by steps of least length; it is then the one evaluated
+    /// last.
+    fn come_back<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        z: &mut [f64],
+        residual: &mut SVector<f64, R>,
+        jacobian: &mut [SVector<f64, R>],
+    ) -> bool {
+        for _ in 0..RETURNS {
+            if !region.return_by(z, &mut self.inside, |rows| problem.linearize(rows)) {
+                return false;
+            }
+            problem.evaluate(z, residual, jacobian);
+            if problem.violation() <= WITHIN {
+                return true;
+            }
+        }
+        false
     }
 }

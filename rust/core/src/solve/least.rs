@@ -87,7 +87,8 @@ impl<const R: usize> Workspace<R> {
             // Strong multipliers carry the rounding of what they multiply.
             let strongest =
                 self.program.multipliers.iter().fold(1.0_f64, |most, m| most.max(m.abs()));
-            if self.program.lagrangian_gradient(&self.rows) <= STATIONARY * strongest {
+            let known = STATIONARY.max(problem.precision());
+            if self.program.lagrangian_gradient(&self.rows) <= known * strongest {
                 return Ending::Met;
             }
             if self.step_down(problem, region, z, &pull, ROUNDING * strongest, least) {
@@ -152,7 +153,7 @@ impl<const R: usize> Workspace<R> {
     /// raises the damping until the model is convex where the target leaves freedom.
     fn energy_model<P: Problem<R>>(
         &mut self,
-        problem: &P,
+        problem: &mut P,
         region: &Region,
         z: &[f64],
         gradient: &[f64],
@@ -163,7 +164,7 @@ impl<const R: usize> Workspace<R> {
         self.hessian.clear();
         self.hessian.resize(size * size, 0.0);
         problem.add_energy_hessian(z, &mut self.hessian);
-        problem.add_hessian(pull, &mut self.hessian);
+        problem.add_hessian(z, pull, &mut self.hessian);
         region.add_curvature(z, &self.program, R, &mut self.hessian);
         self.rows.clear();
         for row in 0..R {
@@ -172,6 +173,7 @@ impl<const R: usize> Workspace<R> {
         }
         self.rows.equalities = R;
         region.linearize(z, &mut self.rows);
+        problem.linearize(&mut self.rows);
         self.stiffen(size, R);
         let mut added = 0.0;
         loop {

@@ -33,6 +33,15 @@ impl Rows {
         &mut self.normals[start..]
     }
 
+    /// Whether a step meets all rows, to rounding.
+    #[must_use]
+    pub fn allow(&self, size: usize, step: &[f64]) -> bool {
+        self.offsets.iter().enumerate().all(|(k, offset)| {
+            let off = dot(self.normal(size, k), step) - offset;
+            (if k < self.equalities { off.abs() } else { off }) <= MET
+        })
+    }
+
     /// Normal of a row.
     #[must_use]
     pub fn normal(&self, size: usize, row: usize) -> &[f64] {

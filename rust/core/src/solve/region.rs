@@ -170,23 +170,37 @@ impl Region {
     /// Brings a point back into the region by steps of least length; false when the region is empty as
     /// far as this can tell. A point inside stays as it is, bit by bit.
     pub fn restore(&self, z: &mut [f64], work: &mut Restoring) -> bool {
-        let Restoring { program, rows } = work;
         // Tangents to discs converge like Newton's method.
         for _ in 0..30 {
             if self.contains(z) {
                 return true;
             }
-            rows.clear();
-            self.linearize(z, rows);
-            program.factor_identity(self.size);
-            program.gradient.clear();
-            program.gradient.resize(self.size, 0.0);
-            if program.solve(rows) != Outcome::Solved {
+            if !self.return_by(z, work, |_| {}) {
                 return false;
             }
-            z.iter_mut().zip(&program.step).for_each(|(z, p)| *z += p);
         }
         false
+    }
+
+    /// One such step, under further rows; false when no step meets them all.
+    pub fn return_by(
+        &self,
+        z: &mut [f64],
+        work: &mut Restoring,
+        further: impl FnOnce(&mut Rows),
+    ) -> bool {
+        let Restoring { program, rows } = work;
+        rows.clear();
+        self.linearize(z, rows);
+        further(rows);
+        program.factor_identity(self.size);
+        program.gradient.clear();
+        program.gradient.resize(self.size, 0.0);
+        if program.solve(rows) != Outcome::Solved {
+            return false;
+        }
+        z.iter_mut().zip(&program.step).for_each(|(z, p)| *z += p);
+        true
     }
 }
 

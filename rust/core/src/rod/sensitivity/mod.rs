@@ -15,6 +15,7 @@ use super::model::{Rod, Workspace};
 use super::plan::Plan;
 use super::settings::TendonRule;
 use super::subsegment::{Local, Piece};
+use super::sweep::{Solved, Sweep};
 use crate::lie::Pose;
 use crate::solve::least_squares::PseudoInverse;
 use crate::solve::quadratic::{backward, dot, forward};
@@ -269,28 +270,13 @@ impl Sensitivity<'_> {
         let plan = self.plan();
         let size = plan.width();
         let point = self.at.frames[plan.data.len()].transform(&tool.translation);
-        let mut local = Local::default();
         let mut by_equation = Matrix6xX::zeros(self.at.count);
-        let mut rows = vec![0.0; 6 * size];
-        for (i, data) in plan.data.iter().enumerate() {
-            let strains = &self.at.strains[i * size..(i + 1) * size];
-            local.prepare::<D>(plan.settings.subsegment, data, strains);
-            let base = &self.at.frames[i];
-            let arm = base.rotation.tr_mul(&(point - base.translation));
-            for (e, node) in local.nodes.iter().enumerate() {
-                for c in 0..D {
-                    let (moved, spin) = node.velocity(c, &arm);
-                    let (moved, spin) = (base.rotation * moved, base.rotation * spin);
-                    for k in 0..3 {
-                        rows[k * size + D * e + c] = moved[k];
-                        rows[(k + 3) * size + D * e + c] = spin[k];
-                    }
-                }
-            }
-            let factor = &self.at.factors[i * size * size..(i + 1) * size * size];
-            for row in rows.chunks_exact_mut(size) {
-                forward(factor, size, row);
-            }
+        let at = Solved {
+            strains: &self.at.strains,
+            factors: &self.at.factors,
+            frames: &self.at.frames,
+        };
+        Sweep::default().run::<D>(plan, &at, &point, |i, rows| {
             for p in plan.starts[i]..plan.starts[i + 1] {
                 if let Some(equation) = self.at.equations[p] {
                     let image = &self.at.images[p * size..(p + 1) * size];
@@ -300,7 +286,7 @@ impl Sensitivity<'_> {
                     }
                 }
             }
-        }
+        });
         self.by_displacement(&by_equation)
     }
 

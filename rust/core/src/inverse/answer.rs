@@ -1,0 +1,53 @@
+//! How an inverse ended, and in words.
+
+use std::borrow::Borrow;
+
+use super::InverseSettings;
+use crate::status::Status;
+
+/// How an inverse ended; what it found is in the workspace.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// Converged: the target is met, with the least bending energy nearby where there is freedom.
+    /// Unreachable: the nearest pose that the starts led to. Infeasible: the bounds exclude each other.
+    pub status: Status,
+    /// Distance from the tool to the target over the axes that count \[m\].
+    pub distance: f64,
+    /// Angle from the tool to the target over the axes that count \[rad\]; 0 for a position.
+    pub angle: f64,
+    /// Steps taken from all starts.
+    pub iterations: usize,
+    /// Starts tried.
+    pub starts: usize,
+}
+
+/// What stood in the way, in a sentence: the bounds that hold back, and what freedom is spent on.
+pub(super) fn tell<S: Borrow<str>>(
+    answer: &Answer,
+    settings: &InverseSettings,
+    held: &[S],
+    least: &str,
+) -> String {
+    let Answer { distance, angle, .. } = *answer;
+    let met = distance <= settings.position_tolerance && angle <= settings.rotation_tolerance;
+    let angle = if angle > 0.0 { format!(" and {angle:.2e} rad") } else { String::new() };
+    let off = format!("{distance:.2e} m{angle} off the target");
+    let held = if held.is_empty() {
+        String::new()
+    } else {
+        format!("; at its bound: {}", held.join(", "))
+    };
+    match answer.status {
+        Status::Converged => String::new(),
+        Status::Unreachable => {
+            format!("the nearest answer of {} starts is {off}{held}", answer.starts)
+        }
+        Status::Infeasible => "the bounds leave the robot no shape".to_owned(),
+        Status::IterationLimit if met => {
+            format!("the target is met, but not with the least {least} nearby")
+        }
+        Status::IterationLimit | Status::NumericalError => {
+            format!("stopped before a nearest answer was found: {off}{held}")
+        }
+    }
+}

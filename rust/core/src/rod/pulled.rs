@@ -1,0 +1,373 @@
+//! The rod as a smooth function of its tensions: what an inverse descends on.
+//!
+//! Given tensions every subsegment is a minimum of its own, so that no set of displacements is infeasible and no
+//! tendon slack. From one balance to the next leads the step `dx = −H⁻¹ (g + Aᵀ dT)` of
+//! [`Chain`](super::chain::Chain), which is of second order, and Newton steps; what is left of g then counts to
+//! first order in all that is read off.
+
+use nalgebra::Vector3;
+
+use super::ascent::EASY;
+use super::chain::{Chain, JUMP};
+use super::model::{Rod, read_state};
+use super::plan::Plan;
+use super::sweep::{Solved, Sweep};
+use crate::lie::{Pose, so3};
+use crate::model::State;
+use crate::robot::Robot;
+use crate::solve::quadratic::dot;
+
+/// Balance that is near enough: its square is below every tolerance \[rad of the own stiffness\].
+const BALANCED: f64 = 1e-6;
+/// Newton steps to a balance.
+const PATIENCE: usize = 12;
+/// No strain moves further in one step \[rad\].
+const STEP: f64 = 0.5;
+/// Steps between two sets of tensions at most, and the shortest one.
+const STEPS: usize = 20;
+const SHORTEST: f64 = 1e-2;
+
+/// A balance under tensions.
+#[derive(Clone, Debug, Default)]
+struct Point {
+    chain: Chain,
+    sound: bool,
+}
+
+impl Point {
+    /// Largest difference of its tensions from others; infinite where it is none.
+    fn away(&self, tensions: &[f64]) -> f64 {
+        if !self.sound {
+            return f64::INFINITY;
+        }
+        let pairs = self.chain.tensions.iter().zip(tensions);
+        pairs.fold(0.0, |most, (a, b)| most.max((a - b).abs()))
+    }
+}
+
+/// The rod under tensions, near points where it was balanced before.
+#[derive(Clone, Debug)]
+pub(crate) struct Pulled<'r> {
+    rod: Rod<'r>,
+    /// The last ones; steps start from the nearest.
+    points: [Point; 3],
+    at: usize,
+    sweep: Sweep,
+    frames: Vec<Pose>,
+    /// The tool in the base's frame.
+    pub(crate) tool: Pose,
+    /// Velocity of the tool and angular velocity by every tension, in the base's axes.
+    pub(crate) columns: Vec<Twist>,
+    /// Every piece's share of them.
+    shares: Vec<Twist>,
+    /// Angular velocities of the subsegment's middle that is looked at.
+    spins: Vec<Vector3<f64>>,
+}
+
+/// A velocity and an angular velocity.
+type Twist = (Vector3<f64>, Vector3<f64>);
+
+impl<'r> Pulled<'r> {
+    /// At rest.
+    pub(crate) fn new(rod: Rod<'r>) -> Self {
+        let mut pulled = Self {
+            rod,
+            points: [Point::default(), Point::default(), Point::default()],
+            at: 0,
+            sweep: Sweep::default(),
+            frames: Vec::new(),
+            tool: Pose::identity(),
+            columns: Vec::new(),
+            shares: Vec::new(),
+            spins: Vec::new(),
+        };
+        pulled.rest();
+        pulled
+    }
+
+    fn plan(&self) -> &'r Plan {
+        self.rod.plan
+    }
+
+    /// The model of displacements.
+    pub(crate) fn rod(&self) -> &Rod<'r> {
+        &self.rod
+    }
+
+    /// The robot it was made of.
+    pub(crate) fn robot(&self) -> &'r Robot {
+        self.rod.robot
+    }
+
+    /// Length of every tendon at rest \[m\].
+    pub(crate) fn rest_lengths(&self) -> &'r [f64] {
+        &self.plan().rest_lengths
+    }
+
+    /// Forgets all but the rest shape, so that what follows does not depend on what went before.
+    pub(crate) fn rest(&mut self) {
+        let plan = self.plan();
+        for point in &mut self.points {
+            point.sound = false;
+        }
+        let Point { chain, sound } = &mut self.points[0];
+        chain.rest(plan);
+        chain.unbound(plan);
+        chain.taut.clear();
+        chain.taut.resize(plan.rest_lengths.len(), true);
+        chain.assemble(plan, EASY);
+        *sound = true;
+        self.at = 0;
+    }
+
+    /// Puts a shape with its tensions in place of the rest shape; false when it is no balance.
+    pub(crate) fn begin(&mut self, start: &State) -> bool {
+        let plan = self.plan();
+        self.rest();
+        let Point { chain, sound } = &mut self.points[0];
+        let Chain { strains, tensions, .. } = chain;
+        *sound = read_state(start, plan, strains, tensions).is_ok() && settle(plan, chain);
+        let began = *sound;
+        if !began {
+            self.rest();
+        }
+        began
+    }
+
+    /// Tensions in the plan's unit of the point at hand.
+    pub(crate) fn tensions(&self) -> &[f64] {
+        &self.points[self.at].chain.tensions
+    }
+
+    /// Goes to the balance under tensions, in the plan's unit; false when none is found from the nearest known
+    /// one.
+    pub(crate) fn go(&mut self, tensions: &[f64]) -> bool {
+        let away = self.points.each_ref().map(|point| point.away(tensions));
+        let nearest = (0..3).fold(0, |best, k| if away[k] < away[best] { k } else { best });
+        self.at = nearest;
+        let mut share = 1.0;
+        for _ in 0..STEPS {
+            if self.points[self.at].away(tensions) == 0.0 {
+                return true;
+            }
+            let Some(next) = self.step(tensions, &mut share) else { return false };
+            self.at = next;
+        }
+        self.points[self.at].away(tensions) == 0.0
+    }
+
+    /// One step towards tensions, of a share of the way that is left; the point that it leads to.
+    fn step(&mut self, tensions: &[f64], share: &mut f64) -> Option<usize> {
+        let plan = self.plan();
+        let (from, to) = (self.at, self.farthest(tensions));
+        *share = (2.0 * *share).min(1.0);
+        loop {
+            let [base, other] = self.points.get_disjoint_mut([from, to]).ok()?;
+            let base = &mut base.chain;
+            base.pulls.clear();
+            base.pulls.extend(base.tensions.iter().zip(tensions).map(|(own, t)| t - own));
+            if !base.bend(plan) {
+                return None;
+            }
+            *share = share.min(STEP / base.longest());
+            let chain = &mut other.chain;
+            chain.unbound(plan);
+            chain.taut.clone_from(&base.taut);
+            chain.strains.clear();
+            chain.tensions.clear();
+            for (strain, step) in base.strains.iter().zip(&base.step) {
+                chain.strains.push(strain + *share * step);
+            }
+            for (own, pull) in base.tensions.iter().zip(&base.pulls) {
+                chain.tensions.push(own + *share * pull);
+            }
+            if *share == 1.0 {
+                chain.tensions.copy_from_slice(tensions);
+            }
+            other.sound = settle(plan, chain);
+            if other.sound {
+                return Some(to);
+            }
+            *share *= 0.25;
+            if *share < SHORTEST || share.is_nan() {
+                return None;
+            }
+        }
+    }
+
+    /// The point that is least useful from where the search is.
+    fn farthest(&self, tensions: &[f64]) -> usize {
+        let others = (0..3).filter(|k| *k != self.at);
+        others.fold(usize::MAX, |worst, k| {
+            let further =
+                |a: usize, b: usize| self.points[a].away(tensions) > self.points[b].away(tensions);
+            if worst == usize::MAX || further(k, worst) { k } else { worst }
+        })
+    }
+
+    /// Change of every tendon's own length from rest, without what its tension stretches it by, and its
+    /// derivatives by the tensions: `−(S + C)`, row by row \[m\].
+    pub(crate) fn displacement(&self, k: usize) -> f64 {
+        let (plan, chain) = (self.plan(), &self.points[self.at].chain);
+        chain.over[k] + chain.slope[k]
+            - plan.compliance[k] * chain.tensions[k]
+            - plan.rest_lengths[k]
+    }
+
+    /// Derivative of a displacement by a tension.
+    pub(crate) fn displacement_slope(&self, k: usize, by: usize) -> f64 {
+        let chain = &self.points[self.at].chain;
+        let count = chain.tensions.len();
+        let give = if k == by { self.plan().compliance[k] } else { 0.0 };
+        -chain.schur[k.max(by) * count + k.min(by)] - give
+    }
+
+    /// Places the tool, and its velocities by the tensions.
+    pub(crate) fn differentiate(&mut self) {
+        match self.plan().unknowns() {
+            3 => self.differentiate_of::<3>(),
+            _ => self.differentiate_of::<4>(),
+        }
+    }
+
+    fn differentiate_of<const D: usize>(&mut self) {
+        let plan = self.plan();
+        let size = plan.width();
+        let chain = &self.points[self.at].chain;
+        let mut frame = Pose::identity();
+        self.frames.clear();
+        self.frames.push(frame);
+        for end in &chain.ends {
+            frame = frame.compose(end);
+            self.frames.push(frame);
+        }
+        self.tool = frame.compose(self.rod.robot.tool());
+        self.columns.clear();
+        self.columns.resize(chain.tensions.len(), (Vector3::zeros(), Vector3::zeros()));
+        self.shares.clear();
+        let (columns, shares) = (&mut self.columns, &mut self.shares);
+        // What balance the strains lack moves the tool by this.
+        let mut lack: Twist = (Vector3::zeros(), Vector3::zeros());
+        let at = Solved { strains: &chain.strains, factors: &chain.factors, frames: &self.frames };
+        self.sweep.run::<D>(plan, &at, &self.tool.translation, |i, rows| {
+            let product = |image: &[f64]| {
+                let by = |k: usize| -dot(&rows[k * size..(k + 1) * size], image);
+                (Vector3::new(by(0), by(1), by(2)), Vector3::new(by(3), by(4), by(5)))
+            };
+            for p in plan.starts[i]..plan.starts[i + 1] {
+                let share = product(&chain.images[p * size..(p + 1) * size]);
+                let sum = &mut columns[plan.pieces[p].tendon];
+                (sum.0, sum.1) = (sum.0 + share.0, sum.1 + share.1);
+                shares.push(share);
+            }
+            let share = product(&chain.gradients[i * size..(i + 1) * size]);
+            lack = (lack.0 + share.0, lack.1 + share.1);
+        });
+        self.tool.translation += lack.0;
+        self.tool.rotation = so3::exp(&lack.1) * self.tool.rotation;
+    }
+
+    /// Second derivatives of the tool's place times a force and of its rotation times a moment, by two tensions, into
+    /// two square matrices: `(a, b)` of the first summed with `(b, a)`; of the second, the change of column a by
+    /// tension b. Where the tool was placed last, and as if tensions turned every subsegment by as much as they do
+    /// there: what is left out is that of its strains by the tensions, small unless it is about to buckle.
+    pub(crate) fn curve(
+        &mut self,
+        force: &Vector3<f64>,
+        moment: &Vector3<f64>,
+        moved: &mut Vec<f64>,
+        turned: &mut Vec<f64>,
+    ) {
+        let plan = self.plan();
+        let count = self.columns.len();
+        for matrix in [&mut *moved, &mut *turned] {
+            matrix.clear();
+            matrix.resize(count * count, 0.0);
+        }
+        let Self { shares, spins, .. } = self;
+        spins.clear();
+        spins.resize(count, Vector3::zeros());
+        for i in 0..plan.data.len() {
+            let range = plan.starts[i]..plan.starts[i + 1];
+            let pieces = &plan.pieces[range.clone()];
+            let halve = |spins: &mut [Vector3<f64>]| {
+                for (piece, share) in pieces.iter().zip(&shares[range.clone()]) {
+                    spins[piece.tendon] += share.1 * 0.5;
+                }
+            };
+            // Half a subsegment turns the other half.
+            halve(spins);
+            for (piece, share) in pieces.iter().zip(&shares[range.clone()]) {
+                let (swung, spun) = (share.0.cross(force), share.1.cross(moment));
+                let row = piece.tendon * count..(piece.tendon + 1) * count;
+                let rows = moved[row.clone()].iter_mut().zip(&mut turned[row]);
+                for ((moved, turned), spin) in rows.zip(spins.iter()) {
+                    *moved += spin.dot(&swung);
+                    *turned += spin.dot(&spun);
+                }
+            }
+            halve(spins);
+        }
+    }
+
+    /// Where nothing was solved yet: by what turns of the subsegments shorten every tendon, linearly \[m\], into
+    /// `right`; and `S`, lower triangle row by row, by what tensions do.
+    pub(crate) fn shorten(&self, turns: &[Vector3<f64>], right: &mut Vec<f64>) -> &[f64] {
+        let plan = self.plan();
+        let (size, unknowns) = (plan.width(), plan.unknowns());
+        let chain = &self.points[0].chain;
+        right.clear();
+        right.resize(plan.rest_lengths.len(), 0.0);
+        let (mut bent, mut turned) = (vec![0.0; size], vec![0.0; size]);
+        for (i, turn) in turns.iter().enumerate() {
+            let rest = &chain.strains[i * size..(i + 1) * size];
+            for (k, bent) in bent.iter_mut().enumerate().filter(|(k, _)| k % unknowns < 3) {
+                *bent = turn[k % unknowns] / plan.settings.elements as f64 - rest[k];
+            }
+            let factor = &chain.factors[i * size * size..(i + 1) * size * size];
+            for c in 0..size {
+                // Lᵀ, its diagonal inverted.
+                let below = (c + 1..size).map(|k| factor[k * size + c] * bent[k]);
+                turned[c] = bent[c] / factor[c * (size + 1)] + below.sum::<f64>();
+            }
+            for p in plan.starts[i]..plan.starts[i + 1] {
+                let image = &chain.images[p * size..(p + 1) * size];
+                right[plan.pieces[p].tendon] -= dot(image, &turned);
+            }
+        }
+        &chain.schur
+    }
+
+    /// What a unit of a tension shortens its own tendon by, elasticity aside \[m\].
+    pub(crate) fn softness(&self, k: usize) -> f64 {
+        let chain = &self.points[self.at].chain;
+        chain.schur[k * (chain.tensions.len() + 1)]
+    }
+
+    /// Tension of one unit of the plan in the unit of the results.
+    pub(crate) fn unit(&self) -> f64 {
+        self.plan().unit
+    }
+}
+
+/// Newton's method to the balance under the chain's tensions; whether there is a minimum near.
+fn settle(plan: &Plan, chain: &mut Chain) -> bool {
+    let mut moved = 0.0;
+    for _ in 0..PATIENCE {
+        let left = chain.assemble(plan, EASY);
+        moved += left.moved;
+        if !left.moment.is_finite() || moved > JUMP {
+            return false;
+        }
+        if left.moment <= BALANCED {
+            return left.stable;
+        }
+        chain.pulls.clear();
+        chain.pulls.resize(chain.tensions.len(), 0.0);
+        if !chain.bend(plan) {
+            return false;
+        }
+        chain.strains.iter_mut().zip(&chain.step).for_each(|(strain, step)| *strain += step);
+    }
+    false
+}
