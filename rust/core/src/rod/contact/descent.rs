@@ -127,7 +127,7 @@ impl Descent {
         (self.balanced, self.blind, self.halved) = (0, 0, f64::INFINITY);
         self.evaluate_here(around)?;
         loop {
-            self.factor(around);
+            self.look(around);
             *budget = budget.saturating_sub(1);
             left = Left { moment: self.moment, ..self.left(around, left.nudged) };
             if !left.worst().is_finite() {
@@ -164,13 +164,13 @@ impl Descent {
                 self.renew();
                 loose = (0.1 * loose).max(0.5 * tolerance);
                 self.evaluate_here(around)?;
-                self.factor(around);
-            }
-            if self.stalled(left.moment) {
+                self.look(around);
+            } else if self.stalled(left.moment) {
                 self.soften();
                 self.evaluate_here(around)?;
-                self.factor(around);
+                self.look(around);
             }
+            self.aim(around);
             if !self.step(around)? {
                 // No further decrease: the rounding of the value, or a kink.
                 if left.moment > 1e3 * tolerance {
@@ -187,13 +187,12 @@ impl Descent {
         self.here.evaluate(plan, scene, bounds, share, &self.estimates, reach)
     }
 
-    /// Gradient and step, with those conditions active that are so at the end of the step.
-    fn factor(&mut self, around: &Surroundings<'_>) {
-        let plan = around.plan;
+    /// Gradient and step with the conditions that are active here.
+    fn look(&mut self, around: &Surroundings<'_>) {
         self.bounded.clear();
         self.bounded.extend(around.bounds.iter().map(|bound| bound.is_finite()));
         self.gives.clear();
-        let own = self.estimates.tendon_give.iter().zip(&plan.compliance);
+        let own = self.estimates.tendon_give.iter().zip(&around.plan.compliance);
         self.gives.extend(own.map(|(give, own)| give + own));
         self.pulling.clear();
         self.pulling.extend(self.here.tensions.iter().map(|tension| *tension > 0.0));
@@ -204,8 +203,13 @@ impl Descent {
         self.slope.clone_from(&self.sweep.gradient);
         (self.moment, self.unstable) = (self.sweep.moment, self.sweep.unstable);
         if self.unstable.is_some() {
-            self.sweep.lead_out(plan, &mut self.escape);
+            self.sweep.lead_out(around.plan, &mut self.escape);
         }
+    }
+
+    /// Step downhill, with those conditions active that are so at its end.
+    fn aim(&mut self, around: &Surroundings<'_>) {
+        let plan = around.plan;
         while self.sweep.unstable.is_some() && self.shift <= SHIFTS {
             self.shift = SHIFT.max(CHANGE * self.shift);
             self.sweep_once(around);
@@ -235,6 +239,7 @@ impl Descent {
             taut: &self.bounded,
             pulling: &self.pulling,
             give: &self.gives,
+            moment: around.scene.moment * around.share,
             shift: self.shift,
         });
     }

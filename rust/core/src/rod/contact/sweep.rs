@@ -28,6 +28,8 @@ pub(super) struct At<'a> {
     pub(super) pulling: &'a [bool],
     /// Compliance of the taut tendons beyond what the rod gives.
     pub(super) give: &'a [f64],
+    /// On the tip.
+    pub(super) moment: Vector3<f64>,
     /// Added to the Hessian, in shares of the stiffness.
     pub(super) shift: f64,
 }
@@ -54,6 +56,8 @@ pub(super) struct Sweep {
     reins: Vec<f64>,
     /// `L⁻¹` times the gradient.
     column: Vec<f64>,
+    /// What a step is to answer.
+    right: Vec<f64>,
     /// Slopes of every piece's length.
     rows: Vec<f64>,
     lengths: Vec<f64>,
@@ -87,8 +91,6 @@ impl Sweep {
         for (k, tendon) in self.taut.iter().enumerate() {
             held[k * (count + 1)] = 1.0 / at.give[*tendon];
         }
-        let mut slope = Vector6::zeros();
-        let mut grown = vec![0.0; count];
         for i in (0..n).rev() {
             beyond.add(&at.fields[i + 1]);
             self.differentiate::<D, ONE>(at, i);
@@ -133,9 +135,7 @@ impl Sweep {
             }
             self.factor_block(i, size, plan.data[i].stiffness[0]);
             let factor = &self.factors[i * size * size..(i + 1) * size * size];
-            let reins = &self.reins[i * size * count..(i + 1) * size * count];
             let growing = &mut self.growing[i * size * count..(i + 1) * size * count];
-            let twists = &self.twists[range.clone()];
             let coupling = &mut self.coupling[range.clone()];
             for a in 0..size {
                 let row = &factor[a * size..=a * size + a];
@@ -150,17 +150,9 @@ impl Sweep {
                 after[0] *= row[a];
                 own[..count].iter_mut().for_each(|own| *own *= row[a]);
             }
-            let column = &mut self.column[range.clone()];
             for a in 0..size {
-                let rein = &reins[a * count..(a + 1) * count];
-                column[a] = self.gradient[i * size + a] + twists[a].dot(&slope) + dot(rein, &grown);
-            }
-            forward(factor, size, column);
-            for (a, z) in column.iter().enumerate() {
-                slope -= coupling[a] * *z;
                 let growing = &growing[a * count..(a + 1) * count];
                 for k in 0..count {
-                    grown[k] -= growing[k] * z;
                     mixed[k] -= coupling[a] * growing[k];
                     for l in 0..count {
                         held[k * count + l] -= growing[k] * growing[l];
@@ -171,9 +163,81 @@ impl Sweep {
                 value -= coupling * coupling.transpose();
             }
         }
+        self.right.clone_from(&self.gradient);
+        self.answer(plan);
+        if at.moment != Vector3::zeros() {
+            self.turn(plan, &at.moment);
+        }
+    }
+
+    /// The step that undoes a slope, in `right`.
+    fn answer(&mut self, plan: &Plan) {
+        let (size, count) = (plan.width(), self.taut.len());
+        let mut slope = Vector6::zeros();
+        let mut grown = vec![0.0; count];
+        for i in (0..plan.data.len()).rev() {
+            let range = i * size..(i + 1) * size;
+            let column = &mut self.column[range.clone()];
+            for (e, column) in range.clone().zip(&mut *column) {
+                let reins = &self.reins[e * count..(e + 1) * count];
+                *column = self.right[e] + self.twists[e].dot(&slope) + dot(reins, &grown);
+            }
+            forward(&self.factors[i * size * size..(i + 1) * size * size], size, column);
+            for (e, z) in range.zip(&*column) {
+                slope -= self.coupling[e] * *z;
+                let growing = &self.growing[e * count..(e + 1) * count];
+                for (grown, growing) in grown.iter_mut().zip(growing) {
+                    *grown -= growing * z;
+                }
+            }
+        }
         self.step.clear();
-        self.step.resize(n * size, 0.0);
+        self.step.resize(self.right.len(), 0.0);
         self.go_out(plan, 0, true);
+    }
+
+    /// Changes the step by what a moment on the tip, which has no potential, adds to the derivatives of the slope:
+    /// `½ m · (ω_a × ω_b)`, of rank two and antisymmetric.
+    fn turn(&mut self, plan: &Plan, moment: &Vector3<f64>) {
+        let size = 0.5 * moment.norm();
+        let axis = moment.normalize();
+        let across = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
+        let axes = [across, axis.cross(&across)];
+        let mut answers = [const { Vec::new() }; 2];
+        let mut spins = [const { Vec::new() }; 2];
+        let own = std::mem::take(&mut self.step);
+        for k in 0..2 {
+            let along = |twist: &Vector6<f64>| twist.fixed_rows::<3>(0).dot(&axes[k]);
+            spins[k] = self.twists.iter().map(along).collect();
+            self.right.clone_from(&spins[k]);
+            self.answer(plan);
+            answers[k] = self.step.iter().map(|s| -s).collect();
+        }
+        let [u, v] = &spins;
+        let [a, b] = &answers;
+        let (c, p, q) = (size * dot(v, a), size * dot(v, b), size * dot(u, a));
+        let (along, across) = (dot(v, &own), dot(u, &own));
+        // At least 1, as c² ≤ p q.
+        let least = 1.0 - c * c + p * q;
+        let share =
+            [((1.0 - c) * along + p * across) / least, ((1.0 + c) * across - q * along) / least];
+        for (e, step) in self.step.iter_mut().enumerate() {
+            *step = own[e] - size * (a[e] * share[0] - b[e] * share[1]);
+        }
+        self.displace(plan);
+    }
+
+    /// First-order displacements of the disks by the step.
+    fn displace(&mut self, plan: &Plan) {
+        let size = plan.width();
+        let mut moved = Vector6::zeros();
+        self.moved.truncate(1);
+        for (twists, steps) in self.twists.chunks_exact(size).zip(self.step.chunks_exact(size)) {
+            for (twist, step) in twists.iter().zip(steps) {
+                moved += twist * *step;
+            }
+            self.moved.push(moved);
+        }
     }
 
     /// Which tendons pull, and room for all.
