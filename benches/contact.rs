@@ -79,7 +79,7 @@ fn pull(c: &mut Criterion, name: &str, n: usize, obstacle: Obstacle, most: f64) 
 }
 
 fn pulls(c: &mut Criterion) {
-    for n in [9, 30, 100] {
+    for n in [9, 30, 100, 500] {
         pull(c, "bar", n, bar(), 6e-3);
         pull(c, "ball", n, ball(), 6e-3);
     }
