@@ -2,9 +2,9 @@
 
 Sphere: three pre-bent fingers, 42 mm from the axis, around a ball of diameter 112 mm whose centre
 is 110 mm above the base. The holes (radius 8 mm) are to touch it, so the backbone is to run on a
-radius of 64 mm. The paper finds the pre-bent shape by optimisation; here it is laid out by hand: an
-arc outwards from the vertical base runs into the circle of 64 mm, and what a pull of 3 % of the
-length bends is taken off, evenly.
+radius of 64 mm. An arc outwards from the vertical base runs into that circle; `design.prebend`
+finds the finger that lies there when it is pulled by 3 % of its length. It is then pulled a ninth
+further.
 
 Cube: three straight fingers hold it; one of them has a helical second tendon. When that is pulled,
 the finger winds and its hold gets a moment about the vertical axis. Material and cube are ours, the
@@ -40,11 +40,14 @@ def heading(s: np.ndarray) -> np.ndarray:
 
 def sphere_gripper() -> tuple[tdcr.Gripper, tdcr.Sphere]:
     """Return three fingers that lie on the ball after a pull of 3 %, and the ball."""
-    rest = np.zeros((COUNT, 3))
-    rest[:, 1] = -np.diff(heading(np.linspace(0, LENGTH, COUNT + 1))) - PULL / HOLE / COUNT
-    finger = tdcr.Robot(
-        tdcr.Backbone(LENGTH, COUNT, rest=rest, **MATERIAL), [tdcr.Tendon(0.0, HOLE)]
-    )
+    s = np.linspace(0, LENGTH * 1.05, 2001)
+    slope = np.stack([-np.sin(heading(s)), np.zeros_like(s), np.cos(heading(s))], axis=1)
+    # The finger's x axis points to the ball; the trapezoidal rule from its base.
+    contour = np.zeros((len(s), 3))
+    contour[1:] = np.cumsum(0.5 * (slope[1:] + slope[:-1]) * s[1], axis=0)
+    straight = tdcr.Robot(tdcr.Backbone(LENGTH, COUNT, **MATERIAL), [tdcr.Tendon(0.0, HOLE)])
+    places = tdcr.design.on_curve(straight, contour)
+    finger = tdcr.design.prebend(straight, places, [-PULL]).require().robot
     gripper = tdcr.Gripper.around(finger, 3, DISTANCE)
     return gripper, tdcr.Sphere((0, 0, HEIGHT), RADIUS)
 

@@ -252,10 +252,10 @@ def test_the_papers_fingers_lie_on_the_ball_after_their_pull(example):
     gripper, ball = example.sphere_gripper()
     for robot in gripper.fingers:
         assert tdcr.clearance(ball, robot.rest_frames[:, :3, 3]).min() > example.HOLE
-        # Without the ball the far part of the backbone runs 8 mm before it, to a millimetre.
+        # Without the ball the far part of the backbone runs 8 mm before it.
         shape = tdcr.forward(robot, [-example.PULL]).require()
         distance = tdcr.clearance(ball, shape.positions)
-        assert np.abs(distance[5:] - example.HOLE).max() < 1e-3
+        assert np.abs(distance[5:] - example.HOLE).max() < 1e-5
     grasp = gripper.close([-example.PULL * 10 / 9], ball, steps=10)
     assert grasp.ok
     assert len({share for share in grasp.touch}) == 1
