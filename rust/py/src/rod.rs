@@ -38,7 +38,8 @@ use crate::surroundings::{self, Surroundings};
 /// axial : bool, optional
 ///     Whether elements stretch. Needs Young's modulus and diameter of the backbone.
 /// tolerance : float, optional
-///     Relative residual of forces and lengths that counts as solved, 1e-13 to 1e-3.
+///     Relative residual of forces and lengths that counts as solved, 1e-13 to 1e-3; among obstacles and
+///     under loads 5e-11 if it is smaller.
 /// max_iterations : int, optional
 ///     Evaluations of the whole rod at most, each of which ends in a Newton step.
 /// body_radius : float, optional

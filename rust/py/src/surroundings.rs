@@ -17,6 +17,7 @@ use tdcr::rod::{Plan, RodSettings};
 use crate::arguments::wrong_type;
 use crate::convert::invalid;
 use crate::loads::Loads;
+use crate::long_call;
 use crate::obstacle::{obstacles, raised};
 
 /// Obstacles, as Python knows them and as the core does, and loads.
@@ -135,7 +136,7 @@ impl<'r> Watched<'r> {
         stop: Arc<AtomicBool>,
         fault: &'r Mutex<Option<Fault>>,
     ) -> Self {
-        Self { rod, stop, fault }
+        Self { rod: rod.stopped_by(Arc::clone(&stop)), stop, fault }
     }
 
     /// Solves from the state of an earlier shape.
@@ -211,7 +212,10 @@ pub(crate) fn checked(py: Python<'_>, fault: Mutex<Option<Fault>>) -> PyResult<(
     })
 }
 
-/// Solves once without the GIL, which Python functions of obstacles take; these see Ctrl-C too.
+/// Rods with more second derivatives than this may take longer than a second among meshes.
+const LONG: usize = 400;
+
+/// Solves once without the GIL, where Ctrl-C can stop it, if that may take long; but for the GIL that Python functions of obstacles take; these see Ctrl-C too.
 pub(crate) fn solve(
     py: Python<'_>,
     robot: &Robot,
@@ -221,7 +225,14 @@ pub(crate) fn solve(
 ) -> PyResult<tdcr::Shape> {
     let fault = Mutex::new(None);
     let rod = LoadedRod::new(robot, plan, scene).map_err(|e| invalid(&e))?;
-    let shape = py.detach(|| job(&Watched::new(rod, Arc::default(), &fault)));
+    let shape = if scene.calls_functions() || plan.second_derivatives() < LONG {
+        py.detach(|| job(&Watched::new(rod, Arc::default(), &fault)))
+    } else {
+        long_call::run(py, None, |control| {
+            let stop = &control.stop;
+            job(&Watched::new(rod, Arc::clone(stop), &fault))
+        })?
+    };
     checked(py, fault)?;
     shape.map_err(|e| invalid(&e))
 }

@@ -39,7 +39,7 @@ pub struct Workspace {
 pub struct Rod<'r> {
     pub(super) robot: &'r Robot,
     pub(super) plan: &'r Plan,
-    stop: Option<Arc<AtomicBool>>,
+    pub(super) stop: Option<Arc<AtomicBool>>,
 }
 
 /// Newton steps per load step, where tensions are given.

@@ -42,6 +42,27 @@ impl Entry {
     }
 }
 
+/// A place of a point, with the distance left to the nearest obstacle and the way from there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    pub(super) at: Vector3<f64>,
+    pub(super) clear: f64,
+    pub(super) away: Vector3<f64>,
+}
+
+impl Spot {
+    pub(super) fn new(at: Vector3<f64>) -> Self {
+        Self { at, clear: f64::INFINITY, away: Vector3::zeros() }
+    }
+
+    /// Counts an obstacle's part in, for a point of a radius.
+    pub(super) fn count(&mut self, near: &Near, radius: f64) {
+        if near.distance - radius < self.clear {
+            (self.clear, self.away) = (near.distance - radius, near.gradient);
+        }
+    }
+}
+
 /// A shape and what it is worth.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Merit {
@@ -50,9 +71,8 @@ pub(super) struct Merit {
     pub(super) frames: Vec<Pose>,
     pub(super) ends: Vec<Pose>,
     pub(super) entries: Vec<Entry>,
-    /// Nearest distance of every point of every disk.
-    pub(super) clear: Vec<f64>,
-    pub(super) places: Vec<Vector3<f64>>,
+    /// Every point of every disk.
+    pub(super) spots: Vec<Spot>,
     /// What tendons are longer than their bounds, elasticity left out \[m\], and their tensions.
     pub(super) over: Vec<f64>,
     pub(super) tensions: Vec<f64>,
@@ -188,18 +208,17 @@ impl Merit {
     /// The points before the obstacles.
     fn touch(&mut self, scene: &Scene, estimates: &Estimates, reach: f64) -> Result<(), Fault> {
         self.entries.clear();
-        self.clear.clear();
-        self.places.clear();
+        self.spots.clear();
         for (disk, points) in scene.points.iter().enumerate() {
             let (frame, give) = (&self.frames[disk], estimates.gives[disk]);
             for (p, point) in points.iter().enumerate() {
                 let at = frame.transform(&point.at);
-                let mut clear = f64::INFINITY;
+                let mut spot = Spot::new(at);
                 for (o, obstacle) in scene.obstacles.iter().enumerate() {
                     self.near.clear();
                     obstacle.constraints(&at, reach + point.radius, &mut self.near)?;
                     for near in &self.near {
-                        clear = clear.min(near.distance - point.radius);
+                        spot.count(near, point.radius);
                     }
                     let held = estimates.of(disk, p, o);
                     let moved = keep_parts(&mut self.near, held, &at);
@@ -218,8 +237,7 @@ impl Merit {
                         self.size += worth;
                     }
                 }
-                self.places.push(at);
-                self.clear.push(clear);
+                self.spots.push(spot);
             }
         }
         self.entries.sort_by_key(|entry| entry.key);

@@ -1,5 +1,8 @@
 //! The rod among obstacles and under loads as a forward model.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use super::descent::{Descent, Left, Surroundings};
 use super::merit::Held;
 use super::scene::{Point, Scene};
@@ -45,6 +48,8 @@ pub struct Workspace {
     ending: Ending,
     /// Share of the load that was reached.
     load: f64,
+    /// Saddles left on the way.
+    nudged: usize,
     /// How deep the undeformed robot is in an obstacle, which, and at which disk.
     sunk: Option<(f64, usize, usize)>,
     fault: Option<Fault>,
@@ -85,6 +90,12 @@ impl<'r> LoadedRod<'r> {
         Ok(Self { rod: Rod::new(robot, plan), scene })
     }
 
+    /// The same, whose solves end soon after the flag is set, with the status of an iteration limit.
+    #[must_use]
+    pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
+        Self { rod: self.rod.stopped_by(stop), ..self }
+    }
+
     fn plan(&self) -> &'r Plan {
         self.rod.plan
     }
@@ -108,8 +119,11 @@ impl<'r> LoadedRod<'r> {
         let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, give))| l - t * give);
         work.kept.bounds.clear();
         work.kept.bounds.extend(from);
+        // A fault comes again, and is told, where the shape is evaluated.
+        if self.sink(work).is_err() {
+            work.sunk = None;
+        }
         work.ending = Ending::Converged;
-        work.kept.forces.clear();
         self.recall(start, work);
         self.resume(displacements, work)
     }
@@ -195,7 +209,7 @@ impl<'r> LoadedRod<'r> {
             plan.rest_lengths.iter().zip(displacements).map(|(l, d)| l + d).collect();
         let cold = from.is_empty();
         let mut stride = if self.scene.obstacles.is_empty() || !cold { 1.0 } else { FIRST };
-        work.load = 0.0;
+        (work.load, work.nudged) = (0.0, 0);
         keep(&mut work.kept, &work.descent);
         while work.load < 1.0 {
             let next = (work.load + stride).min(1.0);
@@ -214,6 +228,8 @@ impl<'r> LoadedRod<'r> {
                 bounds: &bounds,
                 reach: self.reach(),
                 slip: SLIP * self.shortest(),
+                sides: work.sunk.is_none(),
+                stop: self.rod.stop.as_deref(),
             };
             let mut patience = PATIENCE.min(*budget);
             *budget -= patience;
@@ -221,8 +237,13 @@ impl<'r> LoadedRod<'r> {
             let (ending, left) = work.descent.go(&around, &mut patience)?;
             *budget += patience;
             work.left = left;
+            if ending == Ending::Stopped {
+                work.ending = ending;
+                return Ok(());
+            }
             if ending == Ending::Converged {
                 work.load = next;
+                work.nudged += left.nudged;
                 stride *= if before - patience <= EASY { 2.0 } else { 1.0 };
                 keep(&mut work.kept, &work.descent);
                 work.kept.bounds = bounds;
@@ -235,10 +256,10 @@ impl<'r> LoadedRod<'r> {
             self.stiffen(displacements, work);
             stride *= 0.25;
             if stride < SHORTEST || *budget == 0 {
-                work.ending = if *budget == 0 { Ending::Spent } else { ending };
+                work.ending = if *budget == 0 && !left.locked { Ending::Spent } else { ending };
                 let mut once = 1;
-                let (_, left) = work.descent.go(&around, &mut once)?;
-                work.left = left;
+                let (_, here) = work.descent.go(&around, &mut once)?;
+                work.left = Left { locked: left.locked, ..here };
                 return Ok(());
             }
         }
@@ -346,7 +367,8 @@ impl Model for LoadedRod<'_> {
         }
         let from = work.kept.bounds.clone();
         let report = self.run(work, |work, budget| self.climb(displacements, &from, work, budget));
-        if report.status == Status::Converged || work.fault.is_some() {
+        let over = work.fault.is_some() || work.ending == Ending::Stopped;
+        if report.status == Status::Converged || over {
             return Ok(report);
         }
         self.solve(displacements, work)
@@ -368,11 +390,17 @@ impl Model for LoadedRod<'_> {
         if work.ending != Ending::Converged {
             let end = match work.ending {
                 Ending::Spent => "max_iterations did not suffice",
+                Ending::Stopped => "stopped",
                 Ending::Broken => "the arithmetic broke down",
+                _ if work.left.locked => "tensions or contact forces grow without bound",
                 _ => "no stable shape follows",
             };
             let load = 1e2 * work.load;
             parts.push(format!("{end} after {load:.1} % of the displacements and loads"));
+        }
+        if work.ending == Ending::Converged && work.nudged > 0 {
+            let times = work.nudged;
+            parts.push(format!("unstable on the way {times} times: left where it bends easiest"));
         }
         if let Some((depth, obstacle, disk)) = work.sunk {
             parts.push(format!(

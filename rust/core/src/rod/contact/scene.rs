@@ -3,9 +3,10 @@
 use nalgebra::Vector3;
 
 use super::loads::Loads;
+use super::merit::Spot;
 use crate::error::InvalidInput;
 use crate::lie::Pose;
-use crate::obstacle::{Fault, Obstacle};
+use crate::obstacle::{Fault, Obstacle, Volume};
 use crate::robot::Robot;
 use crate::rod::plan::Plan;
 use crate::shape::PointKind;
@@ -22,6 +23,8 @@ pub(super) struct Point {
 
 /// Points of one disk nearer to each other than this share of the disk's size are one.
 const SAME: f64 = 1e-9;
+/// Ways out with a smaller cosine between them are those of two sides of a wall.
+const OPPOSED: f64 = -0.5;
 
 /// Obstacles and loads around a robot.
 #[derive(Clone, Debug)]
@@ -75,33 +78,41 @@ impl Scene {
         })
     }
 
-    /// Whether a point may go straight from a place to another, both with the distance left there: through the
-    /// free space around them, along a surface, or no deeper than `slip` \[m\] into one.
+    /// Whether any obstacle is a function of the caller's.
+    #[must_use]
+    pub fn calls_functions(&self) -> bool {
+        self.obstacles.iter().any(|o| matches!(o.volume(), Volume::SignedDistance(_)))
+    }
+
+    /// Whether a point may go straight from a place to another: through the free space around them, or along a
+    /// surface, no deeper than `slip` \[m\] into it and, where obstacles have `sides`, not to its other one.
     pub(super) fn leads(
         &self,
         radius: f64,
-        from: (Vector3<f64>, f64),
-        to: (Vector3<f64>, f64),
+        from: &Spot,
+        to: &Spot,
         slip: f64,
+        sides: bool,
         cuts: usize,
     ) -> Result<bool, Fault> {
-        if (to.0 - from.0).norm() <= from.1.max(0.0) + to.1.max(0.0) + slip {
+        let free = from.clear.max(0.0) + to.clear.max(0.0);
+        let way = (to.at - from.at).norm();
+        let same_side = !sides || from.away.dot(&to.away) > OPPOSED;
+        if way <= free || (way <= free + slip && same_side) {
             return Ok(true);
         }
         if cuts == 0 {
             return Ok(false);
         }
-        let middle = (from.0 + to.0) * 0.5;
-        let mut clear = f64::INFINITY;
+        let mut middle = Spot::new((from.at + to.at) * 0.5);
         for obstacle in &self.obstacles {
-            clear = clear.min(obstacle.nearest(&middle)?.distance - radius);
+            middle.count(&obstacle.nearest(&middle.at)?, radius);
         }
-        if clear < from.1.min(to.1).min(0.0) - slip {
+        if middle.clear < from.clear.min(to.clear).min(0.0) - slip {
             return Ok(false);
         }
-        let middle = (middle, clear);
-        Ok(self.leads(radius, from, middle, slip, cuts - 1)?
-            && self.leads(radius, middle, to, slip, cuts - 1)?)
+        Ok(self.leads(radius, from, &middle, slip, sides, cuts - 1)?
+            && self.leads(radius, &middle, to, slip, sides, cuts - 1)?)
     }
 }
 

@@ -2,6 +2,8 @@
 
 mod search;
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use super::field::Field;
 use super::merit::{Estimates, Held, Merit};
 use super::scene::Scene;
@@ -16,6 +18,8 @@ const BLIND: usize = 4;
 /// Every renewal of the estimates makes the conditions stiffer by this, up to so many times the first.
 const STIFFER: f64 = 0.1;
 const STIFFEST: f64 = 1e4;
+/// So many renewals of the stiffest may pass without the violation halving.
+const STUCK: usize = 4;
 /// Residuals are not asked to be smaller: what stiff conditions make of rounding.
 const ROUGH: f64 = 5e-11;
 /// Estimates are renewed when the shape is this near balance \[rad of the whole chain\], and the
@@ -31,6 +35,8 @@ const CHANGE: f64 = 8.0;
 /// A nudge off a saddle \[rad, all subsegments together\], and how often.
 const NUDGE: f64 = 1e-1;
 const NUDGES: usize = 6;
+/// Halvings of a nudge that would lead through an obstacle.
+const HALVINGS: usize = 10;
 /// Steps on which a shape may be unstable before it is nudged, if its slope does not lead out \[rad\].
 const BALANCED: usize = 3;
 const SYMMETRIC: f64 = 1e-9;
@@ -46,6 +52,9 @@ pub(super) struct Surroundings<'a> {
     pub(super) reach: f64,
     /// How far a point may go past another than through free space, in one step \[m\].
     pub(super) slip: f64,
+    /// Whether no point may come to an obstacle's other side: not where the robot rests in one.
+    pub(super) sides: bool,
+    pub(super) stop: Option<&'a AtomicBool>,
 }
 
 /// What is left of the conditions.
@@ -57,6 +66,8 @@ pub(super) struct Left {
     pub(super) length: f64,
     /// Newton steps off a saddle.
     pub(super) nudged: usize,
+    /// Whether multipliers grew without an end.
+    pub(super) locked: bool,
 }
 
 impl Left {
@@ -94,6 +105,9 @@ pub(super) struct Descent {
     shifted: bool,
     /// Steps in a row at unstable shapes.
     balanced: usize,
+    /// Renewals of the stiffest conditions in a row that did not halve their violation, and what it was.
+    stuck: usize,
+    violated: f64,
     /// Steps too small for the value to tell since the moment halved last, and what it was then.
     blind: usize,
     halved: f64,
@@ -113,6 +127,7 @@ impl Descent {
         let mut loose = loosest;
         self.shift = 0.0;
         (self.balanced, self.blind, self.halved) = (0, 0, f64::INFINITY);
+        (self.stuck, self.violated) = (0, f64::INFINITY);
         self.evaluate_here(around)?;
         loop {
             self.look(around);
@@ -148,7 +163,13 @@ impl Descent {
             if *budget == 0 {
                 return Ok((Ending::Spent, left));
             }
+            if around.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                return Ok((Ending::Stopped, left));
+            }
             if left.moment <= loose && left.length > tolerance {
+                if self.locks(left.length) {
+                    return Ok((Ending::Lost, Left { locked: true, ..left }));
+                }
                 self.renew();
                 loose = (0.1 * loose).max(0.5 * tolerance);
                 self.evaluate_here(around)?;
@@ -208,8 +229,11 @@ impl Descent {
                 return;
             }
             self.sweep_once(around);
+            if self.sweep.unstable.is_some() {
+                break;
+            }
         }
-        // The sets go round: the ones of this shape lead down.
+        // The sets go round, or lead to no minimum: the ones of this shape lead down.
         self.sweep.step.clone_from(&self.first);
     }
 
@@ -266,7 +290,7 @@ impl Descent {
             let off = if entry.force > 0.0 { entry.gap.abs() } else { (-entry.gap).max(0.0) };
             length = length.max(off / whole);
         }
-        Left { moment: 0.0, length, nudged }
+        Left { length, nudged, ..Default::default() }
     }
 
     /// Makes the multipliers the estimates, and the conditions stiffer.
@@ -279,6 +303,14 @@ impl Descent {
         if estimates.stiffness < STIFFEST {
             estimates.scale(STIFFER);
         }
+    }
+
+    /// Whether the stiffest conditions stay violated by as much however large their multipliers become.
+    fn locks(&mut self, violation: f64) -> bool {
+        let still = self.estimates.stiffness >= STIFFEST && violation > 0.5 * self.violated;
+        self.stuck = if still { self.stuck + 1 } else { 0 };
+        self.violated = violation;
+        self.stuck >= STUCK
     }
 
     /// Whether the last steps were below what the value resolves, and moments do not fall either.
@@ -309,12 +341,23 @@ impl Descent {
 
     /// Leaves a saddle.
     fn nudge(&mut self, around: &Surroundings<'_>) -> Result<(), Fault> {
-        let whole: f64 = self.escape.iter().map(|escape| escape.abs()).sum();
-        for (own, escape) in self.here.strains.iter_mut().zip(&self.escape) {
-            *own += NUDGE / whole * escape;
-        }
         self.balanced = 0;
         self.estimates.scale(self.estimates.stiffness);
-        self.evaluate_here(around)
+        self.evaluate_here(around)?;
+        let whole: f64 = self.escape.iter().map(|escape| escape.abs()).sum();
+        let Surroundings { plan, scene, bounds, share, reach, .. } = *around;
+        let mut size = NUDGE / whole;
+        for _ in 0..HALVINGS {
+            self.there.strains.clear();
+            let moved = self.here.strains.iter().zip(&self.escape);
+            self.there.strains.extend(moved.map(|(own, escape)| own + size * escape));
+            self.there.evaluate(plan, scene, bounds, share, &self.estimates, reach)?;
+            if self.passes(around)? {
+                break;
+            }
+            size *= 0.5;
+        }
+        std::mem::swap(&mut self.here, &mut self.there);
+        Ok(())
     }
 }

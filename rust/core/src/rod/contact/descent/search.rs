@@ -35,8 +35,8 @@ impl Descent {
     /// Takes as much of the step, halved so often, as lowers the value.
     fn along(&mut self, around: &Surroundings<'_>, halvings: usize) -> Result<bool, Fault> {
         let slope = dot(&self.slope, &self.sweep.step);
-        let longest = self.sweep.step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
-        if slope.is_nan() || slope > 0.0 || longest == 0.0 {
+        let longest = longest(&self.sweep.step);
+        if !slope.is_finite() || slope > 0.0 || !(longest > 0.0 && longest.is_finite()) {
             return Ok(false);
         }
         let whole = 1.0_f64.min(STEP / longest);
@@ -46,8 +46,7 @@ impl Descent {
                 return Ok(self.take(share, whole));
             }
             if trial == 0 && share == 1.0 {
-                self.correct(around);
-                if self.goes_down(around, 1.0, slope)? {
+                if self.correct(around) && self.goes_down(around, 1.0, slope)? {
                     return Ok(self.take(share, whole));
                 }
                 self.sweep.step.clone_from(&self.straight);
@@ -95,9 +94,9 @@ impl Descent {
         Ok(down)
     }
 
-    /// The step that meets the conditions as they bend on the way `there`, the end of the whole step, which
+    /// The step that meets the conditions as they bend on the way `there`, if it is one to take, the end of the whole step, which
     /// is kept in `straight`.
-    fn correct(&mut self, around: &Surroundings<'_>) {
+    fn correct(&mut self, around: &Surroundings<'_>) -> bool {
         self.straight.clone_from(&self.sweep.step);
         self.sweep.lengthen(around.plan, &mut self.lengthened);
         let (here, there) = (&mut self.here, &self.there);
@@ -120,6 +119,7 @@ impl Descent {
         for (entry, push) in self.here.entries.iter_mut().zip(pushes) {
             entry.push = push;
         }
+        self.sweep.unstable.is_none() && longest(&self.sweep.step) <= STEP
     }
 
     /// Work that a moment on the tip, which has no potential, does on the way there.
@@ -135,16 +135,19 @@ impl Descent {
     }
 
     /// Whether no point can have gone through an obstacle.
-    fn passes(&self, around: &Surroundings<'_>) -> Result<bool, Fault> {
-        let (here, there) = (&self.here, &self.there);
-        let ways = here.places.iter().zip(&there.places).zip(here.clear.iter().zip(&there.clear));
-        for (point, ((from, to), (before, after))) in around.scene.points.iter().flatten().zip(ways)
-        {
-            let (from, to) = ((*from, *before), (*to, *after));
-            if !around.scene.leads(point.radius, from, to, around.slip, CUTS)? {
+    pub(super) fn passes(&self, around: &Surroundings<'_>) -> Result<bool, Fault> {
+        let ways = self.here.spots.iter().zip(&self.there.spots);
+        for (point, (from, to)) in around.scene.points.iter().flatten().zip(ways) {
+            let Surroundings { scene, slip, sides, .. } = *around;
+            if !scene.leads(point.radius, from, to, slip, sides, CUTS)? {
                 return Ok(false);
             }
         }
         Ok(true)
     }
+}
+
+/// Largest part of a step; infinite if one is not a number.
+fn longest(step: &[f64]) -> f64 {
+    step.iter().fold(0.0, |most, s| if s.is_nan() { f64::INFINITY } else { s.abs().max(most) })
 }
