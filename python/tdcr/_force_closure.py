@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["positively_span", "wrenches"]
+from tdcr import _core
+
+if TYPE_CHECKING:
+    from tdcr._core import Contact, Shape
+
+__all__ = ["place_on_object", "positively_span", "wrenches"]
 
 Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-9
+
+
+def place_on_object(shape: Shape, contact: Contact) -> Array:
+    """Find where the object is touched, shape (3,) [m].
+
+    A contact's own point is the robot's: for "center" that of the disk, a body's radius away.
+    """
+    away = contact.gap
+    if contact.kind == "center" and isinstance(shape.settings, _core.RodSettings):
+        away += shape.settings.body_radius
+    place: Array = contact.point - away * contact.normal
+    return place
 
 
 def wrenches(points: Array, pushes: Array, friction: float, edges: int) -> Array:

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tdcr import _core
-from tdcr._force_closure import positively_span, wrenches
+from tdcr._arguments import index, number, vector, whole
+from tdcr._force_closure import place_on_object, positively_span, wrenches
+from tdcr._placing import places_around, pulls
 from tdcr._progress import told
 from tdcr._value import Value
 from tdcr.errors import InvalidInput
@@ -34,14 +36,15 @@ class Gripper:
     Parameters
     ----------
     fingers : sequence of Robot
-        They do not see each other.
+        Each with a `base`. They do not see each other.
 
     Raises
     ------
     InvalidInput
-        No finger, or two with the same base: a robot without `base` stands in the origin.
+        No finger, one without a base pose (the identity, which a robot has that was given none), or
+        two with the same.
     TypeError
-        Something that is no Robot.
+        Something that is no Robot, a robot that is in no sequence.
 
     Examples
     --------
@@ -57,6 +60,9 @@ class Gripper:
 
     def __init__(self, fingers: Iterable[Robot]) -> None:
         """Check the fingers."""
+        if not isinstance(fingers, Iterable):
+            got = type(fingers).__name__
+            raise TypeError(f"fingers: expected a sequence of Robot, got {got}")
         fingers = tuple(fingers)
         if not fingers:
             raise InvalidInput("fingers: expected one robot or more, got none", "fingers")
@@ -64,6 +70,12 @@ class Gripper:
             name = f"fingers[{i}]"
             if not isinstance(finger, _core.Robot):
                 raise TypeError(f"{name}: expected a Robot, got {type(finger).__name__}")
+            if np.array_equal(finger.base, np.eye(4)):
+                raise InvalidInput(
+                    f"{name}: expected a robot with a base pose (Robot(..., base=...)), got the "
+                    "identity, which is that of a robot without",
+                    name,
+                )
             for j, other in enumerate(fingers[:i]):
                 if np.array_equal(finger.base, other.base):
                     raise InvalidInput(
@@ -104,28 +116,17 @@ class Gripper:
         Raises
         ------
         InvalidInput
-            No finger, a distance that is not positive and finite, an axis of zero length.
+            No finger, a distance that is not positive and finite, an axis of zero length, vectors
+            of another shape, numbers that are not finite.
+        TypeError
+            A value of another type.
         """
-        if count < 1:
-            raise InvalidInput(f"count: expected 1 or more, got {count}", "count")
-        if not 0 < distance < math.inf:
-            raise InvalidInput(f"distance: expected a length > 0 m, got {distance!r}", "distance")
-        frame = np.eye(4)
-        frame[:3, :3] = _turned(np.asarray(axis, float))
-        frame[:3, 3] = center
+        if not isinstance(robot, _core.Robot):
+            raise TypeError(f"robot: expected a Robot, got {type(robot).__name__}")
         fingers = []
-        for k in range(count):
-            cos, sin = (f(azimuth + 2 * math.pi * k / count) for f in (math.cos, math.sin))
-            place = np.array(
-                [
-                    [-cos, sin, 0, distance * cos],
-                    [-sin, -cos, 0, distance * sin],
-                    [0, 0, 1, 0],
-                    [0, 0, 0, 1.0],
-                ]
-            )
+        for k, place in enumerate(places_around(count, distance, axis, center, azimuth)):
             name = f"{robot.name} {k}" if robot.name else f"finger {k}"
-            base = frame @ place @ robot.base
+            base = place @ robot.base
             fingers.append(
                 _core.Robot(robot.backbone, robot.tendons, base=base, tool=robot.tool, name=name)
             )
@@ -165,11 +166,12 @@ class Gripper:
         ------
         InvalidInput
             As `forward`; another number of displacements than fingers, no step.
+        TypeError
+            A value of another type.
         """
-        if steps < 1:
-            raise InvalidInput(f"steps: expected 1 or more, got {steps}", "steps")
-        goals = self._goals(displacements)
-        around = (obstacles,) if isinstance(obstacles, _core.Obstacle) else tuple(obstacles)
+        steps = whole("steps", steps, 1)
+        goals = pulls(displacements, self.fingers)
+        around = tuple(obstacles) if isinstance(obstacles, Iterable) else (obstacles,)
         shares = np.linspace(0.0, 1.0, steps + 1)
         shares.flags.writeable = False
         starts: list[Shape | None] = [None] * len(self.fingers)
@@ -195,43 +197,13 @@ class Gripper:
                     tell(len(shapes))
         return Grasp(shares, tuple(shapes))
 
-    def _goals(self, displacements: Any) -> list[Array]:
-        rows = [np.asarray(row, float) for row in displacements]
-        if all(row.ndim == 0 for row in rows):
-            return [np.array(rows, float)] * len(self.fingers)
-        if len(rows) != len(self.fingers):
-            raise InvalidInput(
-                f"displacements: expected one row for all or {len(self.fingers)} rows, one per "
-                f"finger, got {len(rows)} rows",
-                "displacements",
-            )
-        return rows
-
-
-def _turned(axis: Array) -> Array:
-    """Rotation by the least angle that takes z to an axis."""
-    length = np.linalg.norm(axis)
-    if axis.shape != (3,) or not 0 < length < np.inf:
-        raise InvalidInput(
-            f"axis: expected three numbers of positive length, got {axis.tolist()}", "axis"
-        )
-    x, y, z = axis / length
-    if z < -1 + 1e-12:
-        return np.diag([1.0, -1.0, -1.0])
-    return np.array(
-        [
-            [1 - x * x / (1 + z), -x * y / (1 + z), x],
-            [-x * y / (1 + z), 1 - y * y / (1 + z), y],
-            [-x, -y, z],
-        ]
-    )
-
 
 @dataclass(frozen=True, eq=False)
 class Grasp(Value):
     """A closing gripper, step by step; made by `Gripper.close`.
 
-    Wherever a step is asked for, -1 is the last; `obstacle` is the index of the object.
+    Wherever a step is asked for, -1 is the last; `obstacle` is the index of the object. Others than
+    there are raise InvalidInput.
 
     Attributes
     ----------
@@ -268,22 +240,30 @@ class Grasp(Value):
 
     def contacts(self, step: int = -1, *, obstacle: int = 0) -> list[tuple[int, Contact]]:
         """Return the contacts with the object at a step, each with the finger's number."""
-        row = enumerate(self.shapes[step])
-        return [(k, c) for k, shape in row for c in shape.contacts if c.obstacle == obstacle]
+        touching = self._touching(step, obstacle)
+        return [(k, contact) for k, _, contact in touching]
+
+    def _row(self, step: int) -> tuple[Shape, ...]:
+        return self.shapes[index("step", step, -len(self.shapes), len(self.shapes))]
+
+    def _touching(self, step: int, obstacle: int) -> list[tuple[int, Shape, Contact]]:
+        row = self._row(step)
+        obstacle = index("obstacle", obstacle, 0, len(row[0].obstacles))
+        return [(k, s, c) for k, s in enumerate(row) for c in s.contacts if c.obstacle == obstacle]
 
     def center(self, step: int = -1, *, obstacle: int = 0) -> Array:
-        """Return the centre of a Sphere, Box or Capsule, else of its contacts, shape (3,) [m].
+        """Return the centre of a Sphere, Box or Capsule, else of the places touched, (3,) [m].
 
         NaN where there are none of either.
         """
-        obstacles = self.shapes[step][0].obstacles
-        match obstacles[obstacle]:
+        touching = self._touching(step, obstacle)
+        match self._row(step)[0].obstacles[obstacle]:
             case _core.Sphere() | _core.Box() as body:
                 return body.center
             case _core.Capsule() as body:
                 return (body.a + body.b) / 2
-        points = [contact.point for _, contact in self.contacts(step, obstacle=obstacle)]
-        return np.mean(points, axis=0) if points else np.full(3, np.nan)
+        places = [place_on_object(shape, contact) for _, shape, contact in touching]
+        return np.mean(places, axis=0) if places else np.full(3, np.nan)
 
     def force(self, step: int = -1, *, obstacle: int = 0) -> Array:
         """Return the total force on the object, shape (3,), in the unit of the shapes."""
@@ -300,11 +280,13 @@ class Grasp(Value):
         step, obstacle : int, optional
             Which step and object.
         """
-        touching = self.contacts(step, obstacle=obstacle)
+        given = None if about is None else vector("about", about, " [m]")
+        touching = self._touching(step, obstacle)
         if not touching:
             return np.zeros(3)
-        at = self.center(step, obstacle=obstacle) if about is None else np.asarray(about, float)
-        total: Array = np.sum([np.cross(c.point - at, -c.force) for _, c in touching], axis=0)
+        at = self.center(step, obstacle=obstacle) if given is None else given
+        arms = [place_on_object(shape, contact) - at for _, shape, contact in touching]
+        total: Array = np.cross(arms, [-contact.force for _, _, contact in touching]).sum(axis=0)
         return total
 
     def force_closure(
@@ -328,21 +310,23 @@ class Grasp(Value):
         ------
         InvalidInput
             A coefficient that is negative or not finite, fewer than three edges.
+        TypeError
+            A value of another type.
 
         Notes
         -----
         B. Mishra, J. Schwartz, M. Sharir, *On the existence and synthesis of multifinger positive
         grips*, Algorithmica 2 (1987), doi:10.1007/BF01840373.
         """
+        friction = number("friction", friction)
         if not 0 <= friction < math.inf:
             raise InvalidInput(f"friction: expected 0 or more, got {friction!r}", "friction")
-        if edges < 3:
-            raise InvalidInput(f"edges: expected 3 or more, got {edges}", "edges")
-        touching = [contact for _, contact in self.contacts(step, obstacle=obstacle)]
+        edges = whole("edges", edges, 3)
+        touching = self._touching(step, obstacle)
         if not touching:
             return False
-        points = np.array([contact.point for contact in touching])
-        pushes = -np.array([contact.normal for contact in touching])
+        points = np.array([place_on_object(shape, contact) for _, shape, contact in touching])
+        pushes = -np.array([contact.normal for _, _, contact in touching])
         pushes /= np.linalg.norm(pushes, axis=1)[:, None]
         return positively_span(wrenches(points, pushes, friction, edges))
 
@@ -384,7 +368,9 @@ class Grasp(Value):
         Raises
         ------
         InvalidInput
-            Another ending.
+            Another ending, fewer than one step per second.
+        TypeError
+            A value of another type.
         ImportError
             matplotlib is not installed.
         """

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tdcr._arguments import whole
 from tdcr._canvas import Scene, Solid, draw, draw_forces
 from tdcr._view import plane_of
 from tdcr.errors import InvalidInput
@@ -29,7 +30,7 @@ def _figure() -> Any:
 
 def plot_grasp(grasp: Grasp, step: int, ax: Any, title: str | None) -> Any:
     """Draw a step of a grasp into 3-D axes; see `Grasp.plot`."""
-    row = grasp.shapes[step]
+    row = grasp._row(step)
     if ax is None:
         _figure()
         from matplotlib import pyplot
@@ -63,6 +64,7 @@ def animate_grasp(grasp: Grasp, path: str | os.PathLike[str], fps: int) -> None:
     """Write a GIF; see `Grasp.animate`."""
     if os.path.splitext(path)[1].lower() != ".gif":
         raise InvalidInput(f"path: expected one ending in .gif, got {os.fspath(path)!r}", "path")
+    fps = whole("fps", fps, 1)
     figure = _figure()
     # A constrained layout would shift the axes from frame to frame.
     figure.set_layout_engine("none")

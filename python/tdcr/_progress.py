@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import numpy as np
+
 __all__ = ["told"]
 
 
@@ -22,9 +24,17 @@ def told(
         What the bar is for.
     total : int or None
         How much there is to do, if that is known.
+
+    Raises
+    ------
+    TypeError
+        Neither a bool nor a callable.
     """
     if callable(progress):
         yield progress
+    elif not (progress is None or isinstance(progress, (bool, np.bool_))):
+        got = type(progress).__name__
+        raise TypeError(f"progress: expected a bool or a callable, got {got}")
     elif progress:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn

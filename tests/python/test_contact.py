@@ -402,6 +402,9 @@ def test_a_robot_that_sits_in_an_obstacle_says_so():
 SETUP = """
     import numpy as np, tdcr
     robot = tdcr.Robot(tdcr.Backbone(0.18, 9), [tdcr.Tendon(0.0, 0.008)])
+    base = np.eye(4)
+    base[2, 3] = 0.001
+    placed = tdcr.Robot(robot.backbone, robot.tendons, base=base)
     bar = tdcr.Cylinder((0.030, 0, 0.100), (0, 1, 0), 0.010)
     rows = np.linspace(0, -0.006, 1_000_000)[:, None]
     def slow(x):
@@ -417,7 +420,7 @@ SETUP = """
         "tdcr.forward_batch(robot, rows, obstacles=bar, warm=True)",
         "tdcr.forward_batch(robot, rows, obstacles=tdcr.SignedDistance(slow))",
         "tdcr.forward(robot, [-0.006], obstacles=tdcr.SignedDistance(slow))",
-        "tdcr.Gripper([robot]).close([-0.006], bar, steps=100_000)",
+        "tdcr.Gripper([placed]).close([-0.006], bar, steps=100_000)",
     ],
     ids=["rows", "rows of a function", "function", "gripper"],
 )

@@ -12,6 +12,7 @@ import pytest
 
 import tdcr
 from tdcr._force_closure import positively_span, wrenches
+from tdcr._placing import turned
 
 ROOT = Path(__file__).resolve().parents[2]
 BALL = tdcr.Sphere((0, 0, 0.14), 0.04)
@@ -63,22 +64,30 @@ def test_a_gripper_is_a_value():
     assert gripper != tdcr.Gripper(gripper.fingers[:2])
 
 
-def test_bad_grippers():
-    with pytest.raises(tdcr.InvalidInput, match="fingers: expected one robot or more, got none"):
-        tdcr.Gripper([])
-    with pytest.raises(tdcr.InvalidInput, match=r"fingers\[1\]: expected a base of its own"):
-        tdcr.Gripper([finger(), finger()])
-    with pytest.raises(TypeError, match=r"fingers\[0\]: expected a Robot, got str"):
-        tdcr.Gripper(["thumb"])
-    for keywords, argument in (
-        ({"count": 0}, "count"),
-        ({"distance": 0.0}, "distance"),
-        ({"distance": np.nan}, "distance"),
-        ({"axis": (0, 0, 0)}, "axis"),
-        ({"axis": (0, 1)}, "axis"),
-    ):
-        with pytest.raises(tdcr.InvalidInput, match=f"{argument}: expected"):
-            tdcr.Gripper.around(finger(), **{"count": 3, "distance": 0.06, **keywords})
+@pytest.mark.parametrize("small", [0.0, 1e-17, 1e-12, 1e-8, 1e-6, 1e-4, 0.1, 1.0])
+@pytest.mark.parametrize("end", [-1.0, 0.0, 1.0])
+def test_the_axis_is_exact_near_the_poles_too(small, end):
+    for lean in ((1, 0), (0, -1), (0.6, 0.8)):
+        axis = np.array([small * lean[0], small * lean[1], end])
+        if not axis.any():
+            continue
+        turn = turned(axis)
+        assert np.abs(turn.T @ turn - np.eye(3)).max() < 1e-15
+        assert np.linalg.det(turn) == pytest.approx(1, abs=1e-15)
+        unit = axis / np.linalg.norm(axis)
+        assert np.abs(turn[:, 2] - unit).max() <= 1e-15
+        # The least angle: about an axis across both.
+        across = np.array([-axis[1], axis[0], 0])
+        if small > 1e-14:
+            assert np.abs(turn @ across - across).max() <= 1e-15 * small
+        assert len(tdcr.Gripper.around(finger(), 3, 0.06, axis=axis).fingers) == 3
+
+
+def test_the_axis_at_the_poles_and_of_any_length():
+    assert turned(np.array([0, 0, 2.0])).tolist() == np.eye(3).tolist()
+    assert turned(np.array([0, 0, -2.0])).tolist() == np.diag([1.0, -1, -1]).tolist()
+    for length in (5e-324, 1e-200, 1e300):
+        assert turned(np.array([0, length, 0]))[:, 2].tolist() == [0, 1, 0]
 
 
 # --- closing -----------------------------------------------------------------------------------
@@ -136,16 +145,6 @@ def test_a_grasp_is_a_value(grasp):
     assert hash(again) == hash(grasp)
     assert not again.shares.flags.writeable
     assert "3 fingers in 8 steps, all converged" in repr(grasp)
-
-
-def test_bad_closings():
-    gripper = tdcr.Gripper.around(finger(), 3, 0.06)
-    with pytest.raises(tdcr.InvalidInput, match="displacements: expected one row for all or 3"):
-        gripper.close([[-0.001], [-0.001]], BALL)
-    with pytest.raises(tdcr.InvalidInput, match="steps: expected 1 or more"):
-        gripper.close([-0.001], BALL, steps=0)
-    with pytest.raises(tdcr.InvalidInput, match="displacements"):
-        gripper.close([np.nan], BALL, steps=1)
 
 
 # --- force closure -----------------------------------------------------------------------------
@@ -208,10 +207,52 @@ def test_closure_of_a_grasp(grasp):
     assert not grasp.force_closure(step=0)
     assert not grasp.force_closure()
     assert grasp.force_closure(0.5)
-    with pytest.raises(tdcr.InvalidInput, match="friction: expected 0 or more"):
-        grasp.force_closure(-0.5)
-    with pytest.raises(tdcr.InvalidInput, match="edges: expected 3 or more"):
-        grasp.force_closure(0.5, edges=2)
+
+
+def test_closure_is_of_places_on_the_object_not_of_disks_a_bodys_radius_away():
+    """Two pairs across a column, one of each 30 mm higher: from the disks they look less steep."""
+    radius, fingers = 0.02, []
+    for azimuth in (0.0, np.pi / 2):
+        for k, height in enumerate((0.0, 0.03)):
+            base = np.eye(4)
+            base[2, 3] = height
+            pair = tdcr.Gripper.around(finger(base=base), 2, 0.055, azimuth=azimuth)
+            fingers.append(pair.fingers[k])
+    for column in (
+        tdcr.Box((0, 0, 0.15), (0.03, 0.03, 0.06)),
+        tdcr.Cylinder((0, 0, 0), (0, 0, 1), 0.03),
+    ):
+        settings = tdcr.RodSettings(body_radius=radius)
+        grasp = tdcr.Gripper(fingers).close([-0.003], column, steps=6, settings=settings)
+        touching = [contact for _, contact in grasp.contacts()]
+        assert {contact.kind for contact in touching} == {"center"}
+        disks = np.array([contact.point for contact in touching])
+        normals = np.array([contact.normal for contact in touching])
+        moved = disks - normals * [[contact.gap + radius] for contact in touching]
+        assert np.abs(tdcr.clearance(column, moved)).max() < 1e-12
+        frictions = np.linspace(0.005, 0.995, 100)
+        by_hand = [closed(moved, -normals, friction) for friction in frictions]
+        assert [grasp.force_closure(friction) for friction in frictions] == by_hand
+        assert [closed(disks, -normals, friction) for friction in frictions] != by_hand
+        # A force along the normal has the same moment from both.
+        forces = np.array([-contact.force for contact in touching])
+        about = np.array([0.01, 0.02, 0.03])
+        assert grasp.moment(about) == pytest.approx(
+            np.cross(disks - about, forces).sum(axis=0), abs=1e-9
+        )
+
+
+def test_the_center_of_what_has_none_is_that_of_the_places_touched():
+    radius, bar = 0.02, tdcr.Cylinder((0, 0, 0.13), (0, 1, 0), 0.04)
+    gripper = tdcr.Gripper.around(finger(), 3, 0.08)
+    settings = tdcr.RodSettings(body_radius=radius)
+    grasp = gripper.close([-0.004], bar, steps=8, settings=settings)
+    touching = [contact for _, contact in grasp.contacts()]
+    assert {contact.kind for contact in touching} == {"center"}
+    moved = [c.point - c.normal * (c.gap + radius) for c in touching]
+    assert grasp.center() == pytest.approx(np.mean(moved, axis=0), abs=1e-15)
+    disks = np.mean([c.point for c in touching], axis=0)
+    assert np.linalg.norm(grasp.center() - disks) > 1e-3
 
 
 # --- pictures and the paper's cases ------------------------------------------------------------
