@@ -59,6 +59,9 @@ from tdcr._inverse import (
 )
 from tdcr._sensitivity import Gradient, Variation
 from tdcr._status import Status
+from tdcr._voxels import Volume, VoxelMap
+from tdcr._workspace import workspace
+from tdcr._workspace_results import Reach, Workspace
 from tdcr.errors import InvalidInput, NotConverged, TdcrError
 
 __all__ = [
@@ -85,6 +88,7 @@ __all__ = [
     "Obstacle",
     "PrebendSettings",
     "PsoSettings",
+    "Reach",
     "Robot",
     "RodSettings",
     "RoutingSettings",
@@ -97,6 +101,9 @@ __all__ = [
     "TdcrError",
     "Tendon",
     "Variation",
+    "Volume",
+    "VoxelMap",
+    "Workspace",
     "clearance",
     "constant_curvature",
     "design",
@@ -111,4 +118,5 @@ __all__ = [
     "pso",
     "sensitivity",
     "track",
+    "workspace",
 ]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tdcr._core import Shape
 
-__all__ = ["plot_shape", "save_picture"]
+__all__ = ["one_of", "plot_shape", "require_matplotlib", "save_picture"]
 
 View = Literal["auto", "2d", "3d"]
 
@@ -81,9 +81,9 @@ def plot_shape(
     ImportError
         matplotlib is not installed.
     """
-    _require_matplotlib()
-    _one_of("view", view, ("auto", "2d", "3d"))
-    _one_of("unit", unit, ("auto", "m", "mm"))
+    require_matplotlib()
+    one_of("view", view, ("auto", "2d", "3d"))
+    one_of("unit", unit, ("auto", "m", "mm"))
     scene = Scene.of(shape, unit)
     plane = plane_of(shape)
     flat = _is_flat(view, plane, ax)
@@ -144,7 +144,7 @@ def check_picture(path: str | os.PathLike[str]) -> None:
     ImportError
         matplotlib is not installed.
     """
-    _require_matplotlib()
+    require_matplotlib()
     from matplotlib.figure import Figure
 
     formats = Figure().canvas.get_supported_filetypes()
@@ -156,7 +156,8 @@ def check_picture(path: str | os.PathLike[str]) -> None:
         )
 
 
-def _require_matplotlib() -> None:
+def require_matplotlib() -> None:
+    """Say how to get matplotlib where it is not installed."""
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
@@ -165,7 +166,8 @@ def _require_matplotlib() -> None:
         ) from error
 
 
-def _one_of(argument: str, value: str, names: tuple[str, ...]) -> None:
+def one_of(argument: str, value: str, names: tuple[str, ...]) -> None:
+    """Refuse a word that is none of those known."""
     if value not in names:
         expected = " or ".join(f'"{name}"' for name in names)
         raise InvalidInput(f"{argument}: expected {expected}, got {value!r}", argument)

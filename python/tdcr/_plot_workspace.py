@@ -1,0 +1,156 @@
+"""Pictures of workspaces. Imported on first use by ``Workspace.plot``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from tdcr._plot import one_of, require_matplotlib
+from tdcr.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from tdcr._canvas import Unit
+    from tdcr._voxels import VoxelMap
+    from tdcr._workspace_results import Workspace
+
+__all__ = ["plot_workspace"]
+
+View = Literal["section", "3d"]
+Shown = Literal["dexterity", "manipulability", "samples"]
+
+_LABELS = {
+    "dexterity": "directions of the tip [sr]",
+    "manipulability": "manipulability",
+    "samples": "samples per voxel",
+}
+_SIZE = (6.4, 4.8)
+
+
+def plot_workspace(
+    workspace: Workspace,
+    *,
+    ax: Any = None,
+    value: Shown = "dexterity",
+    view: View | None = None,
+    voxel: float | None = None,
+    title: str | None = None,
+    unit: Unit = "auto",
+) -> Axes:
+    """Draw the voxels that tips reach, coloured; see `Workspace.plot`."""
+    require_matplotlib()
+    one_of("value", value, tuple(_LABELS))
+    one_of("unit", unit, ("auto", "m", "mm"))
+    if view is not None:
+        one_of("view", view, ("section", "3d"))
+    solid = view == "3d" if ax is None else ax.name == "3d"
+    if ax is not None and view is not None and solid != (view == "3d"):
+        raise InvalidInput(f"view: expected what suits the Axes, {ax.name}, got {view!r}", "view")
+    seen = _map(workspace, value, voxel)
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = _axes(pyplot.figure(figsize=_SIZE, layout="constrained"), solid)
+    if unit == "auto":
+        unit = "mm" if workspace.robot.backbone.total_length < 2.0 else "m"
+    scale = 1000.0 if unit == "mm" else 1.0
+    painted = _solid(ax, seen, scale) if solid else _section(ax, seen, scale)
+    _spine(ax, workspace, scale, solid)
+    ax.set_xlabel(f"x [{unit}]")
+    if not solid:
+        ax.set_ylabel(f"z [{unit}]")
+    else:
+        ax.set_ylabel(f"y [{unit}]")
+        ax.set_zlabel(f"z [{unit}]")
+    bar = ax.figure.colorbar(painted, ax=ax, shrink=0.8 if solid else 1.0)
+    bar.set_label(_LABELS[value])
+    bar.outline.set_linewidth(0.6)
+    text = _title(workspace) if title is None else title
+    if text:
+        ax.set_title(text, fontsize=10, parse_math=False)
+    drawn: Axes = ax
+    return drawn
+
+
+def _axes(figure: Figure, solid: bool) -> Axes:
+    return figure.add_subplot(projection="3d") if solid else figure.add_subplot()
+
+
+def _map(workspace: Workspace, value: Shown, voxel: float | None) -> VoxelMap:
+    """Values per voxel in the frame of the base, where sections are cut."""
+    base = workspace.robot.base
+    turn, place = base[:3, :3], base[:3, 3]
+    local = replace(
+        workspace,
+        tips=(workspace.tips - place) @ turn,
+        directions=workspace.directions @ turn,
+    )
+    if value == "manipulability":
+        return local.manipulability(voxel)
+    seen = local.dexterity(voxel)
+    return seen if value == "dexterity" else seen._replace(values=seen.counts.astype(np.float64))
+
+
+def _section(ax: Any, seen: VoxelMap, scale: float) -> Any:
+    """Squares of the layer of voxels beside the plane y = 0."""
+    from matplotlib.collections import PolyCollection
+
+    layer = (seen.centers[:, 1] > 0.0) & (seen.centers[:, 1] < seen.voxel)
+    if not layer.any():
+        # Nothing there, as of tips in another plane: the layer that is nearest.
+        nearest = seen.centers[np.abs(seen.centers[:, 1]).argmin(), 1]
+        layer = np.abs(seen.centers[:, 1] - nearest) < 0.5 * seen.voxel
+    corners = 0.5 * seen.voxel * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    squares = (seen.centers[layer][:, None, [0, 2]] + corners) * scale
+    # Edges of the face's colour hide the seams that some readers of PDF show.
+    painted = PolyCollection(
+        list(squares), array=seen.values[layer], edgecolors="face", linewidths=0.2
+    )
+    painted.set_clim(0.0, float(seen.values.max()))
+    ax.add_collection(painted)
+    ax.autoscale_view()
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.06)
+    ax.grid(True, color="#E6E8EB", linewidth=0.6)
+    ax.set_axisbelow(True)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    return painted
+
+
+def _solid(ax: Any, seen: VoxelMap, scale: float) -> Any:
+    """Centres of the voxels behind the plane y = 0, so that one looks inside."""
+    behind = seen.centers[:, 1] > 0.0
+    behind = behind if behind.any() else np.ones(len(behind), bool)
+    points = seen.centers[behind] * scale
+    span = np.maximum(np.ptp(points, axis=0), 1e-9 * scale)
+    # Squares about as wide as a voxel: 4 inches hold the longest span.
+    size = (4.0 * 72.0 * seen.voxel * scale / span.max()) ** 2
+    painted = ax.scatter(
+        *points.T, c=seen.values[behind], s=size, marker="s", linewidths=0, depthshade=False
+    )
+    painted.set_clim(0.0, float(seen.values.max()))
+    ax.set_aspect("equal")
+    ax.locator_params(nbins=4)
+    ax.view_init(elev=22, azim=-65)
+    return painted
+
+
+def _spine(ax: Any, workspace: Workspace, scale: float, solid: bool) -> None:
+    """Draw the backbone at rest, from its base."""
+    frames = np.linalg.inv(workspace.robot.base) @ workspace.robot.rest_frames
+    points = frames[:, :3, 3].T * scale
+    shown = points if solid else points[[0, 2]]
+    ax.plot(*shown, color="#5F6670", linewidth=2.0, zorder=3.0)
+    ax.plot(*shown[:, :1], color="#22262B", marker="s", markersize=6, zorder=3.1)
+
+
+def _title(workspace: Workspace) -> str:
+    name = f"{workspace.robot.name}\n" if workspace.robot.name else ""
+    failed = len(workspace) - int(workspace.ok.sum())
+    lost = f", {failed:,} not converged" if failed else ""
+    return f"{name}{workspace.model} model, {len(workspace):,} samples{lost}"
