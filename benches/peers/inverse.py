@@ -138,8 +138,8 @@ def compare(robot: tdcr.Robot, targets: Array) -> None:
 def main() -> None:
     """Run all comparisons."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--targets", type=int, default=50)
-    count = parser.parse_args().targets
+    parser.add_argument("--quick", action="store_true", help="few targets: checks, rough figures")
+    count = 3 if parser.parse_args().quick else 50
     for turns in (0.0, 0.2):
         robot = trunk(turns)
         tips = random_tips(robot, count, seed=0)

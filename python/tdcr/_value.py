@@ -51,10 +51,10 @@ def _read_only(value: Any) -> Any:
 
 
 def same(mine: Any, theirs: Any) -> bool:
-    """Compare arrays by their numbers, NaN to NaN, lists and dicts by items, others as they are."""
+    """Compare arrays by their numbers, NaN to NaN, lists, tuples and dicts by items, others as they are."""
     if isinstance(mine, dict) and isinstance(theirs, dict):
         return mine.keys() == theirs.keys() and all(same(mine[name], theirs[name]) for name in mine)
-    if isinstance(mine, list) and isinstance(theirs, list):
+    if isinstance(mine, list | tuple) and type(mine) is type(theirs):
         return len(mine) == len(theirs) and all(map(same, mine, theirs))
     if isinstance(mine, np.ndarray) and isinstance(theirs, np.ndarray):
         return np.array_equal(mine, theirs, equal_nan=mine.dtype.kind == "f")

@@ -224,3 +224,11 @@ def test_the_example_draws_what_is_kept(tmp_path):
         )
         assert len(made) == 10 * shapes
         assert made == pytest.approx(kept, abs=1e-5, nan_ok=True)
+
+
+def test_places_behind_the_base_are_told_not_refused():
+    robot = tdcr.Robot(tdcr.Backbone(0.04, 2), [tdcr.Tendon(0.0, 0.005)])
+    places = [[0.002, -0.005, -0.004], [-0.023, 0.013, 0.007]]
+    answer = design.prebend(robot, places, [-0.001])
+    assert answer.status == tdcr.Status.unreachable
+    assert "off the base's z axis" in answer.message

@@ -278,3 +278,11 @@ def test_the_example_draws_what_is_kept(tmp_path):
     )
     assert len(made) == 30
     assert made == pytest.approx(kept, abs=1e-3, nan_ok=True)
+
+
+def test_results_with_bounds_are_compared():
+    robot = tdcr.Robot(tdcr.Backbone(0.18, 9), [tdcr.Tendon(k, 0.008) for k in (0.0, 1.0)])
+    places = tdcr.forward(robot, [-0.01, -0.005]).positions
+    one, other = (design.routing(robot, places, bounds=(-0.02, 0)) for _ in range(2))
+    assert one == other
+    assert hash(one) == hash(other)

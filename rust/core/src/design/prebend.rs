@@ -213,7 +213,8 @@ impl Design<'_> {
         let share = if bend > self.settings.max_bend { self.settings.max_bend / bend } else { 1.0 };
         // A rest strain of more than half a turn does not exist.
         let out = Vector3::new(rest.x * share, rest.y * share, rest.z);
-        out * (std::f64::consts::PI / out.norm()).min(1.0)
+        // Less a rounding, which the backbone's own check must not see.
+        out * ((1.0 - 1e-15) * std::f64::consts::PI / out.norm()).min(1.0)
     }
 
     fn errors(&self, shape: &Shape) -> Vec<f64> {
