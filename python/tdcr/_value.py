@@ -51,7 +51,7 @@ def _read_only(value: Any) -> Any:
 
 
 def same(mine: Any, theirs: Any) -> bool:
-    """Compare arrays by their numbers, NaN to NaN, lists, tuples and dicts by items, others as they are."""
+    """Compare arrays by their numbers, NaN to NaN, containers by items, others as they are."""
     if isinstance(mine, dict) and isinstance(theirs, dict):
         return mine.keys() == theirs.keys() and all(same(mine[name], theirs[name]) for name in mine)
     if isinstance(mine, list | tuple) and type(mine) is type(theirs):
