@@ -2,16 +2,21 @@
 //! subsegment, and loads alone. Every bench checks its answer first.
 #![allow(missing_docs, clippy::unwrap_used)] // criterion's macros; a bench may stop on a bad answer.
 
-use std::f64::consts::{PI, TAU};
+#[path = "../tests/rust/prism.rs"]
+mod prism;
+
+use std::f64::consts::PI;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use tdcr::Status;
 use tdcr::model::Model;
-use tdcr::obstacle::{Cylinder, Mesh, Obstacle, Sphere};
+use tdcr::obstacle::{Cylinder, Obstacle, Sphere};
 use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
 use tdcr::rod::contact::{LoadedRod, Loads, Scene, Workspace};
 use tdcr::rod::{Plan, RodSettings};
+
+use prism::prism;
 
 type V = Vector3<f64>;
 const STEPS: usize = 20;
@@ -35,25 +40,7 @@ fn bar() -> Obstacle {
 
 /// A straight tube of about 10,000 triangles.
 fn tube() -> Obstacle {
-    let (sides, rings, radius) = (50, 99, 0.02);
-    let mut vertices = vec![V::new(0.0, 0.0, -0.05), V::new(0.0, 0.0, 0.25)];
-    for ring in 0..=rings {
-        let z = -0.05 + 0.3 * ring as f64 / rings as f64;
-        vertices.extend((0..sides).map(|k| {
-            let (sin, cos) = (TAU * k as f64 / sides as f64).sin_cos();
-            V::new(radius * cos, radius * sin, z)
-        }));
-    }
-    let at = |ring: usize, k: usize| 2 + ring * sides + k % sides;
-    let mut faces = Vec::new();
-    for k in 0..sides {
-        faces.extend([[0, at(0, k + 1), at(0, k)], [1, at(rings, k), at(rings, k + 1)]]);
-        for ring in 0..rings {
-            let [a, b, c, d] = [at(ring, k), at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)];
-            faces.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    Obstacle::new(Mesh::new(&vertices, &faces).unwrap(), true)
+    Obstacle::new(prism(50, 99, 0.02, (-0.05, 0.25)), true)
 }
 
 /// A pull in steps from rest, each from the answer before it.

@@ -34,6 +34,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from rod import WARM
 
 import tdcr
 
@@ -45,14 +46,6 @@ STEPS, LENGTH, RADIUS = 20, 0.18, 0.008
 # Strains alone have a full Hessian: with so many, its C code is not compiled.
 DENSE = 50
 
-WARM = {
-    "warm_start_init_point": "yes",
-    "warm_start_bound_push": 1e-9,
-    "warm_start_bound_frac": 1e-9,
-    "warm_start_slack_bound_push": 1e-9,
-    "warm_start_slack_bound_frac": 1e-9,
-    "warm_start_mult_bound_push": 1e-9,
-}
 # The first is from the shape before as well, with IPOPT's own start of multipliers.
 SETTINGS: list[dict[str, Any]] = [
     {},

@@ -1,12 +1,11 @@
 """Mahapatra & Ghosal's figures remade: the facts that the example prints, and its pictures."""
 
 import csv
-import importlib.util
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from example_scripts import example_script
 
 pytest.importorskip("matplotlib")
 
@@ -16,14 +15,8 @@ RADIUS = 0.008
 
 @pytest.fixture(scope="module")
 def example():
-    name = "mahapatra_ghosal_figures"
-    spec = importlib.util.spec_from_file_location(name, ROOT / f"examples/{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    # Where its dataclass looks for its module.
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules[name]
+    with example_script("mahapatra_ghosal_figures") as module:
+        yield module
 
 
 @pytest.fixture(scope="module")

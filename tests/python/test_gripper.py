@@ -1,20 +1,17 @@
 """Grippers: placement, closing, forces on the object, force closure, pictures."""
 
 import copy
-import importlib.util
 import itertools
 import pickle
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from example_scripts import example_script
 
 import tdcr
 from tdcr._force_closure import positively_span, wrenches
 from tdcr._placing import turned
 
-ROOT = Path(__file__).resolve().parents[2]
 BALL = tdcr.Sphere((0, 0, 0.14), 0.04)
 
 
@@ -280,13 +277,8 @@ def test_pictures(grasp, tmp_path):
 
 @pytest.fixture(scope="module")
 def example():
-    name = "mahapatra_ghosal_grippers"
-    spec = importlib.util.spec_from_file_location(name, ROOT / f"examples/{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules[name]
+    with example_script("mahapatra_ghosal_grippers") as module:
+        yield module
 
 
 def test_the_papers_fingers_lie_on_the_ball_after_their_pull(example):

@@ -9,13 +9,14 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tdcr::lie::so3;
 use tdcr::model::Model;
-use tdcr::obstacle::{Capsule, Cuboid, Cylinder, HalfSpace, Mesh, Obstacle, Sphere};
+use tdcr::obstacle::{Capsule, Cuboid, Cylinder, HalfSpace, Obstacle, Sphere};
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
 use tdcr::rod::contact::{LoadedRod, Workspace};
 use tdcr::rod::{Rod, Workspace as RodWorkspace};
 use tdcr::{Shape, Status};
 
 use crate::contact_common::{Case, V};
+use crate::prism::prism;
 
 const FREE: f64 = f64::INFINITY;
 
@@ -67,28 +68,6 @@ fn robot(draw: &mut ChaCha8Rng) -> Robot {
     Robot::new(Backbone::new(spec).unwrap(), tendons, None, None, None).unwrap()
 }
 
-/// A prism of `sides` around the z axis, closed by lids.
-fn prism(sides: usize, rings: usize, radius: f64, half: f64) -> Mesh {
-    let mut vertices = vec![V::new(0.0, 0.0, -half), V::new(0.0, 0.0, half)];
-    for ring in 0..=rings {
-        let z = -half + 2.0 * half * ring as f64 / rings as f64;
-        vertices.extend((0..sides).map(|k| {
-            let (sin, cos) = (TAU * k as f64 / sides as f64).sin_cos();
-            V::new(radius * cos, radius * sin, z)
-        }));
-    }
-    let at = |ring: usize, k: usize| 2 + ring * sides + k % sides;
-    let mut faces = Vec::new();
-    for k in 0..sides {
-        faces.extend([[0, at(0, k + 1), at(0, k)], [1, at(rings, k), at(rings, k + 1)]]);
-        for ring in 0..rings {
-            let [a, b, c, d] = [at(ring, k), at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)];
-            faces.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    Mesh::new(&vertices, &faces).unwrap()
-}
-
 /// An obstacle that the unobstructed shape goes into at `p`.
 fn obstacle(draw: &mut ChaCha8Rng, l: f64, p: &V) -> (&'static str, Obstacle) {
     let (u, r) = (unit(draw), l * draw.random_range(0.03..0.25));
@@ -112,7 +91,9 @@ fn obstacle(draw: &mut ChaCha8Rng, l: f64, p: &V) -> (&'static str, Obstacle) {
             ("box", Obstacle::new(Cuboid::new(&center, &half, &turn).unwrap(), false))
         }
         _ => {
-            let mesh = prism(draw.random_range(3..20), 2, r, r * draw.random_range(0.5..2.0));
+            let sides = draw.random_range(3..20);
+            let half = r * draw.random_range(0.5..2.0);
+            let mesh = prism(sides, 2, r, (-half, half));
             let pose = tdcr::lie::Pose { rotation: turn, translation: center };
             ("mesh", Obstacle::new(mesh, false).transformed(&pose))
         }
@@ -134,7 +115,7 @@ fn lumen(draw: &mut ChaCha8Rng, l: f64) -> (&'static str, Obstacle) {
             )
         }
         _ => {
-            let mesh = prism(draw.random_range(5..24), 6, r, 1.2 * l);
+            let mesh = prism(draw.random_range(5..24), 6, r, (-1.2 * l, 1.2 * l));
             ("in mesh", Obstacle::new(mesh, true))
         }
     }

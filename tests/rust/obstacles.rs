@@ -61,20 +61,29 @@ fn check_derivatives(obstacle: &Obstacle, x: &V) -> Result<(), TestCaseError> {
         if ahead.feature != behind.feature {
             continue;
         }
-        let slope = (ahead.distance - behind.distance) / (2.0 * h);
-        prop_assert!((slope - near.gradient[i]).abs() < 1e-6, "{obstacle:?} {x:?}");
-        let curve = (ahead.gradient - behind.gradient) / (2.0 * h);
         // A capsule's Hessian jumps where its tube meets its ends; there it is between the two.
-        let error = (curve - near.hessian.column(i)).amax();
         let jump = (ahead.hessian - behind.hessian).amax() / 2.0;
+        let slope = (ahead.distance - behind.distance) / (2.0 * h);
+        prop_assert!(
+            (slope - near.gradient[i]).abs() < 1e-6 + h * jump / 2.0,
+            "{obstacle:?} {x:?}"
+        );
+        let curve = (ahead.gradient - behind.gradient) / (2.0 * h);
+        let error = (curve - near.hessian.column(i)).amax();
         prop_assert!(
             error < 1e-4 * (1.0 + near.hessian.amax()) + jump,
             "{obstacle:?} {x:?} {error:e}"
         );
     }
     prop_assert!((near.gradient.norm() - 1.0).abs() < 1e-15);
-    // A distance does not curve along its own gradient.
-    prop_assert!((near.hessian * near.gradient).amax() < 1e-14 * (1.0 + near.hessian.amax()));
+    // A distance does not curve along its own gradient. Near an axis both know their direction only to the
+    // rounding of where the point is, over how near.
+    let size = near.hessian.amax();
+    let direction = 1e-14 * (1.0 + 0.1 * size);
+    prop_assert!(
+        (near.hessian * near.gradient).amax() < direction * (1.0 + size),
+        "{obstacle:?} {x:?}"
+    );
     Ok(())
 }
 

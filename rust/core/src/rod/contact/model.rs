@@ -131,7 +131,7 @@ impl<'r> LoadedRod<'r> {
     /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
     fn recall(&self, start: &State, work: &mut Workspace) {
         let (plan, base) = (self.plan(), self.rod.robot.base());
-        let reach = self.reach();
+        let reach = REACH * self.shortest();
         let mut near = Vec::new();
         for contact in start.contacts.iter().filter(|c| c.disk < self.scene.points.len()) {
             let same = |p: &Point| (p.kind, p.tendon) == (contact.kind, contact.tendon);
@@ -159,11 +159,7 @@ impl<'r> LoadedRod<'r> {
         work.descent.estimates.forces.sort_by_key(|held| held.key);
     }
 
-    /// How far off parts of obstacles are looked at \[m\].
-    fn reach(&self) -> f64 {
-        REACH * self.shortest()
-    }
-
+    /// Length of the shortest subsegment \[m\].
     fn shortest(&self) -> f64 {
         let plan = self.plan();
         (0..plan.data.len()).map(|i| plan.length(i)).fold(f64::INFINITY, f64::min)
@@ -208,6 +204,7 @@ impl<'r> LoadedRod<'r> {
         let wanted: Vec<f64> =
             plan.rest_lengths.iter().zip(displacements).map(|(l, d)| l + d).collect();
         let cold = from.is_empty();
+        let shortest = self.shortest();
         let mut stride = if self.scene.obstacles.is_empty() || !cold { 1.0 } else { FIRST };
         (work.load, work.nudged) = (0.0, 0);
         keep(&mut work.kept, &work.descent);
@@ -226,8 +223,8 @@ impl<'r> LoadedRod<'r> {
                 scene: self.scene,
                 share: if cold { next } else { 1.0 },
                 bounds: &bounds,
-                reach: self.reach(),
-                slip: SLIP * self.shortest(),
+                reach: REACH * shortest,
+                slip: SLIP * shortest,
                 sides: work.sunk.is_none(),
                 stop: self.rod.stop.as_deref(),
             };
