@@ -792,7 +792,12 @@ def _inverse(
     settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None,
     search: InverseSettings | None,
     method: str,
-) -> tuple[_Array, _Array, Status, str, float, float, int, int]: ...
+    obstacles: Iterable[Obstacle] | Obstacle,
+    loads: Loads | None,
+) -> tuple[
+    tuple[_Array, _Array, Status, str, float, float, int, int],
+    Shape | None,
+]: ...
 def _inverse_solutions(
     robot: Robot,
     target: ArrayLike,
@@ -815,6 +820,8 @@ def _inverse_batch(
     threads: int | None,
     progress: Callable[[int], object] | None,
     chain: bool,
+    obstacles: Iterable[Obstacle] | Obstacle,
+    loads: Loads | None,
 ) -> dict[str, Any]: ...
 def _arc_from_displacements(
     displacements: ArrayLike,

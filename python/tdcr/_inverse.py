@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -16,7 +16,7 @@ from tdcr.errors import InvalidInput
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from tdcr._core import Robot, Shape
+    from tdcr._core import Loads, Obstacle, Robot, Shape
     from tdcr._inverse_results import Array, Method, Settings
 
     BoundsLike: TypeAlias = Bounds | tuple[ArrayLike, ArrayLike]
@@ -39,6 +39,8 @@ def inverse(
     start: ArrayLike | Inverse | Shape | None = None,
     method: Method = "newton",
     bounds: BoundsLike | None = None,
+    obstacles: Obstacle | Iterable[Obstacle] = (),
+    loads: Loads | None = None,
     settings: Settings | None = None,
     search: InverseSettings | None = None,
 ) -> Inverse:
@@ -65,6 +67,10 @@ def inverse(
         Displacements to try first, as along a path [m].
     bounds : Bounds or (lower, upper), optional
         What may be used; a pair bounds displacements [m].
+    obstacles : Obstacle or iterable of Obstacle, optional
+        What the rod stays out of, or inside of, as in `forward`; it may lean on them.
+    loads : Loads, optional
+        Weight, forces and moments on the rod, as in `forward`.
     settings : RodSettings or ConstantCurvatureSettings, optional
         Those of the model.
     search : InverseSettings, optional
@@ -79,7 +85,10 @@ def inverse(
     ------
     InvalidInput
         A target that is not finite or no rigid motion, bounds or a start that do not fit the robot,
-        a model without inverse, proportional tendons.
+        a model without inverse, proportional tendons, obstacles or loads for another model than
+        the rod.
+    Exception
+        What the function of a `SignedDistance` raises.
 
     Examples
     --------
@@ -97,10 +106,32 @@ def inverse(
     """
     search = InverseSettings() if search is None else search
     bounds = _bounds(bounds)
-    row = _core._inverse(
-        robot, target, model, _displacements(start), bounds, settings, search, method
+    around = _around(obstacles)
+    row, shape = _core._inverse(
+        robot,
+        target,
+        model,
+        _displacements(start),
+        bounds,
+        settings,
+        search,
+        method,
+        around,
+        loads,
     )
-    return Inverse(robot, _frozen(target), *row, model, settings, bounds, search, method)
+    return Inverse(
+        robot,
+        _frozen(target),
+        *row,
+        model,
+        settings,
+        bounds,
+        search,
+        method,
+        obstacles=around,
+        loads=loads,
+        known_shape=shape,
+    )
 
 
 def inverse_solutions(
@@ -151,6 +182,8 @@ def inverse_batch(
     start: ArrayLike | Inverse | InverseBatch | Shape | None = None,
     method: Method = "newton",
     bounds: BoundsLike | None = None,
+    obstacles: Obstacle | Iterable[Obstacle] = (),
+    loads: Loads | None = None,
     settings: Settings | None = None,
     search: InverseSettings | None = None,
     threads: int | None = None,
@@ -160,7 +193,7 @@ def inverse_batch(
 
     Parameters
     ----------
-    robot, model, method, bounds, settings, search
+    robot, model, method, bounds, obstacles, loads, settings, search
         As for `inverse`.
     targets : array_like, shape (B, 3) or (B, 4, 4)
         One target per row [m].
@@ -189,6 +222,8 @@ def inverse_batch(
         "threads": threads,
         "chain": False,
         "method": method,
+        "obstacles": _around(obstacles),
+        "loads": loads,
     }
     return _many(robot, targets, model, bounds, settings, search, progress, options)
 
@@ -200,6 +235,8 @@ def track(
     model: str = "rod",
     start: ArrayLike | Inverse | Shape | None = None,
     bounds: BoundsLike | None = None,
+    obstacles: Obstacle | Iterable[Obstacle] = (),
+    loads: Loads | None = None,
     settings: Settings | None = None,
     search: InverseSettings | None = None,
     progress: bool | Callable[[int], object] = False,
@@ -213,7 +250,7 @@ def track(
 
     Parameters
     ----------
-    robot, model, bounds, settings, search
+    robot, model, bounds, obstacles, loads, settings, search
         As for `inverse`.
     targets : array_like, shape (B, 3) or (B, 4, 4)
         The path, target by target [m].
@@ -236,6 +273,8 @@ def track(
         "threads": None,
         "chain": True,
         "method": "newton",
+        "obstacles": _around(obstacles),
+        "loads": loads,
     }
     return _many(robot, targets, model, bounds, settings, search, progress, options)
 
@@ -278,6 +317,8 @@ def _many(
         bounds=bounds,
         search=search,
         method=options["method"],
+        obstacles=options["obstacles"],
+        loads=options["loads"],
     )
 
 
@@ -294,6 +335,13 @@ def _bounds(bounds: BoundsLike | None) -> Bounds | None:
     except TypeError as error:
         message = str(error).removeprefix("displacement")
         raise TypeError(f"bounds{message}") from None
+
+
+def _around(obstacles: Any) -> Any:
+    """Turn obstacles into a tuple, which nobody can change; what is none is named by the core."""
+    if isinstance(obstacles, _core.Obstacle):
+        return (obstacles,)
+    return tuple(obstacles) if isinstance(obstacles, Iterable) else obstacles
 
 
 def _displacements(start: Any) -> Any:

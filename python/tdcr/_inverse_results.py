@@ -22,6 +22,8 @@ if TYPE_CHECKING:
         ConstantCurvatureSettings,
         InverseSettings,
         LinkageSettings,
+        Loads,
+        Obstacle,
         Robot,
         RodSettings,
         Shape,
@@ -51,7 +53,8 @@ class Inverse(Value):
     unreachable: the nearest answer that was found; infeasible: the bounds exclude each other;
     iteration_limit, numerical_error: stopped before either."""
     message: str
-    """What stood in the way; empty when it converged."""
+    """What stood in the way; empty when it converged, unless from rest the displacements lead to
+    another shape."""
     error: float
     """Distance from the tool to the target, over the axes that count [m]."""
     rotation_error: float
@@ -67,6 +70,10 @@ class Inverse(Value):
     method: Method
     hits: int = 1
     """How many starts led to this answer (`inverse_solutions`)."""
+    obstacles: tuple[Obstacle, ...] = ()
+    loads: Loads | None = None
+    known_shape: Shape | None = None
+    """The shape found, where displacements do not say which it is: among obstacles, under loads."""
 
     _hashed: ClassVar[tuple[str, ...]] = ("robot", "model", "displacements")
 
@@ -77,7 +84,20 @@ class Inverse(Value):
 
     @cached_property
     def shape(self) -> Shape:
-        """The robot under the displacements; the rod under the tensions, which they go with."""
+        """The robot under the displacements; the rod under the tensions, which they go with.
+
+        Of a row of a batch among obstacles or under loads: the shape that rest leads to.
+        """
+        if self.known_shape is not None:
+            return self.known_shape
+        if self.obstacles or self.loads is not None:
+            return _core.forward(
+                self.robot,
+                self.displacements,
+                obstacles=self.obstacles,
+                loads=self.loads,
+                settings=self.settings,
+            )
         if self.model == "rod":
             return _core.forward(self.robot, tensions=self.tensions, settings=self.settings)
         return _core.forward(
@@ -135,6 +155,8 @@ class InverseBatch(Value, Sequence[Inverse]):
     bounds: Bounds | None
     search: InverseSettings
     method: Method
+    obstacles: tuple[Obstacle, ...] = ()
+    loads: Loads | None = None
 
     _hashed: ClassVar[tuple[str, ...]] = ("robot", "model", "displacements")
 
@@ -163,6 +185,8 @@ class InverseBatch(Value, Sequence[Inverse]):
             self.bounds,
             self.search,
             self.method,
+            obstacles=self.obstacles,
+            loads=self.loads,
         )
 
     def _message(self, i: int) -> str:

@@ -286,8 +286,6 @@ def test_other_models_refuse(model):
 def test_what_the_rod_does_not_offer_among_obstacles():
     proportional = tdcr.RodSettings(tendons="proportional")
     for around in ({"obstacles": BAR}, {"loads": tdcr.Loads()}):
-        with pytest.raises(tdcr.InvalidInput, match="tensions: expected displacements where"):
-            tdcr.forward(steel(), tensions=[1.0], **around)
         with pytest.raises(tdcr.InvalidInput, match='tendons: expected "sliding"'):
             tdcr.forward(steel(), [-0.001], settings=proportional, **around)
     with pytest.raises(tdcr.InvalidInput, match="shape: expected a shape without obstacles"):

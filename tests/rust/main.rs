@@ -23,6 +23,7 @@ mod finger;
 mod inverse;
 mod inverse_bounds;
 mod inverse_common;
+mod inverse_contact;
 mod inverse_rod;
 mod lie;
 mod linkage_bars;

@@ -55,7 +55,7 @@ use crate::surroundings::{self, Surroundings, Watched};
 /// obstacles : Obstacle or sequence of Obstacle, optional
 ///     What the robot stays out of, or inside of: its disks' centres, holes and the places opposite to the
 ///     holes, and a body around the backbone by `RodSettings.body_radius`. Frictionless. Model "rod" with
-///     sliding tendons and displacements only.
+///     sliding tendons only.
 /// loads : Loads, optional
 ///     Weight, forces and moments on the robot. As obstacles, and only with Young's modulus and diameter.
 /// settings : RodSettings, LinkageSettings or ConstantCurvatureSettings, optional
@@ -75,7 +75,7 @@ use crate::surroundings::{self, Surroundings, Watched};
 /// InvalidInput
 ///     Both or neither of displacements and tensions, NaN, -inf, another number of values than
 ///     tendons, a (B, K) array, a negative or infinite tension, tensions, obstacles, loads or a start for
-///     another model than the rod, tensions or proportional tendons with obstacles or loads, loads without
+///     another model than the rod, proportional tendons with tensions, obstacles or loads, loads without
 ///     Young's modulus or with another number of `disk_forces` than disks, a start of another robot, model or number of elements, an unknown model, settings of
 ///     another model, axial strain or elastic tendons without Young's modulus; in the models that take
 ///     no others a pre-bent backbone, a routing, two linkage tendons on one azimuth.
@@ -116,17 +116,10 @@ pub(crate) fn forward(
             let plan = solved.rod_plan(settings).map_err(|e| invalid(&e))?;
             match (around.any(), load) {
                 (None, load) => rod::run(py, core, &plan, |rod| rod::solve(rod, load, start))?,
-                (Some(what), Load::Tensions(_)) => {
-                    let expected = format!("displacements where there are {what}");
-                    return Err(invalid(&InvalidInput::new("tensions", expected, "tensions")));
-                }
-                (Some(_), Load::Displacements(displacements)) => {
+                (Some(_), load) => {
                     let scene = around.scene(core, &plan, &settings).map_err(|e| invalid(&e))?;
-                    let shape = surroundings::solve(py, core, &plan, &scene, |rod| match start {
-                        Some(start) => rod.shape_from(&start, &displacements),
-                        None => rod.shape(&displacements),
-                    })?;
-                    Ok((displacements, shape))
+                    let solve = |rod: &surroundings::Watched<'_>| rod.solve_load(load, start);
+                    Ok(surroundings::solve(py, core, &plan, &scene, solve)?)
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! The engines of `inverse`, `inverse_batch`, `track` and `inverse_solutions`; their docstrings are in
 //! Python.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use nalgebra::{Matrix4, Vector3};
 use numpy::PyUntypedArrayMethods;
@@ -14,16 +14,21 @@ use tdcr::inverse::{
     Answer, ConstantCurvatureInverse, InverseRows, Inverter, Method, RodInverse, Target,
     invert_path, invert_rows,
 };
+use tdcr::model::State;
 use tdcr::robot::rigid_motion;
+use tdcr::rod::contact::Scene;
 use tdcr::{InvalidInput, Status, constant_curvature, rod};
 
 use crate::arguments::{optional, whole};
 use crate::bounds::Bounds;
 use crate::convert::{float_array, frozen, invalid, status, values, wrong_shape};
-use crate::forward::Choice;
+use crate::forward::{Choice, rod_only};
 use crate::long_call;
 use crate::robot::Robot;
+use crate::rod::Load;
 use crate::settings::InverseSettings;
+use crate::shape::Shape;
+use crate::surroundings::{self, Surroundings, Watched, checked};
 
 /// Steps and evaluations, of a few tenths of a microsecond each, up to which a single inverse ends soon
 /// enough to go without listening for Ctrl-C.
@@ -85,7 +90,7 @@ fn many_targets(value: &Bound<'_, PyAny>) -> PyResult<Vec<Target>> {
 /// The model's knowledge of a robot, which an inverse refers to.
 enum Plans<'a> {
     Arcs(&'a constant_curvature::Plan),
-    Rod(Arc<rod::Plan>),
+    Rod(Arc<rod::Plan>, Option<Scene>),
 }
 
 /// An inverse of one of the models.
@@ -99,12 +104,22 @@ impl<'a> Plans<'a> {
         robot: &'a Bound<'_, Robot>,
         model: &str,
         settings: Option<&Bound<'_, PyAny>>,
+        around: &Surroundings,
     ) -> PyResult<Self> {
-        match Choice::new(model, settings)? {
+        let choice = Choice::new(model, settings)?;
+        match choice {
+            Choice::Rod(_) => {}
+            _ => around.any().map_or(Ok(()), |what| Err(rod_only(what, model)))?,
+        }
+        match choice {
             Choice::ConstantCurvature(settings) => {
                 robot.get().constant_curvature_plan(settings).map(Self::Arcs)
             }
-            Choice::Rod(settings) => robot.get().rod_plan(settings).map(Self::Rod),
+            Choice::Rod(settings) => robot.get().rod_plan(settings).and_then(|plan| {
+                let core = &robot.get().0;
+                let scene = around.any().map(|_| around.scene(core, &plan, &settings));
+                Ok(Self::Rod(plan, scene.transpose()?))
+            }),
             Choice::Linkage(_) => {
                 let expected = "a model with an inverse (\"rod\" or \"constant_curvature\")";
                 Err(InvalidInput::new("model", expected, format!("\"{model}\"")))
@@ -133,9 +148,13 @@ impl<'a> Plans<'a> {
                 let inverse = ConstantCurvatureInverse::new(robot, plan, &bounds, search);
                 inverse.map(|inverse| Engine::Arcs(Box::new(inverse)))
             }
-            Self::Rod(plan) => {
+            Self::Rod(plan, scene) => {
                 let inverse = RodInverse::new(robot, plan, &bounds, search);
-                inverse.map(|inverse| Engine::Rod(Box::new(inverse)))
+                let among = |inverse: RodInverse<'a>| match scene {
+                    Some(scene) => inverse.among(scene),
+                    None => Ok(inverse),
+                };
+                inverse.and_then(among).map(|inverse| Engine::Rod(Box::new(inverse)))
             }
         }
         .map_err(|e| invalid(&e))
@@ -218,27 +237,51 @@ pub(crate) fn _inverse(
     settings: Option<&Bound<'_, PyAny>>,
     search: Option<&Bound<'_, InverseSettings>>,
     method: &str,
-) -> PyResult<Row> {
-    let plans = Plans::new(robot, model, settings)?;
+    obstacles: &Bound<'_, PyAny>,
+    loads: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Row, Option<Shape>)> {
+    let around = Surroundings::new(py, Some(obstacles), loads)?;
+    let plans = Plans::new(robot, model, settings, &around)?;
     let engine = plans.engine(robot, bounds, search, method)?;
     let target = one_target(target)?;
-    match &engine {
+    let (found, state) = match &engine {
         Engine::Arcs(inverse) => {
-            invert_one(py, &**inverse, &target, start, soon(inverse.settings(), 1))
+            let soon = soon(inverse.settings(), 1);
+            invert_one(py, &**inverse, &target, start, &around, soon)?
         }
         Engine::Rod(inverse) => {
-            invert_one(py, &**inverse, &target, start, soon(inverse.settings(), ROD))
+            let soon = around.any().is_none() && soon(inverse.settings(), ROD);
+            let found = invert_one(py, &**inverse, &target, start, &around, soon);
+            checked(py, Mutex::new(inverse.take_fault()))?;
+            found?
         }
-    }
+    };
+    let (displacements, tensions, answer, message) = found;
+    let shape = match (state, &plans) {
+        (Some(state), Plans::Rod(plan, Some(scene))) => {
+            let load = Load::Displacements(displacements.clone());
+            let core = &robot.get().0;
+            let solve = |rod: &Watched<'_>| rod.solve_load(load, Some(state));
+            let (given, shape) = surroundings::solve(py, core, plan, scene, solve)?;
+            let choice = Choice::new(model, settings)?;
+            Some(Shape::new(robot.get().clone(), choice, given, shape).among(around))
+        }
+        _ => None,
+    };
+    Ok((row(py, displacements, tensions, &answer, message)?, shape))
 }
+
+/// Displacements, tensions, how it ended and the message, and the shape where displacements do not say which it is.
+type Found = ((Vec<f64>, Vec<f64>, Answer, String), Option<State>);
 
 fn invert_one<I: Inverter>(
     py: Python<'_>,
     inverse: &I,
     target: &Target,
     start: Option<&Bound<'_, PyAny>>,
+    around: &Surroundings,
     soon: bool,
-) -> PyResult<Row>
+) -> PyResult<Found>
 where
     I::Start: Send,
 {
@@ -249,14 +292,16 @@ where
         let mut tensions = displacements.clone();
         inverse.write_displacements(&work, &mut displacements);
         inverse.write_tensions(&work, &mut tensions);
-        (displacements, tensions, answer, inverse.message(&answer, &work))
+        let message = inverse.message(&answer, &work);
+        ((displacements, tensions, answer, message), inverse.state(&mut work))
     };
-    let (displacements, tensions, answer, message) = if soon {
-        py.detach(|| solve(inverse.buffers(None)))
-    } else {
-        long_call::run(py, None, |control| solve(inverse.buffers(Some(&control.stop))))?
-    };
-    row(py, displacements, tensions, &answer, message)
+    if soon {
+        return Ok(py.detach(|| solve(inverse.buffers(None))));
+    }
+    long_call::run(py, None, |control| {
+        around.stopped_by(&control.stop);
+        solve(inverse.buffers(Some(&control.stop)))
+    })
 }
 
 /// All answers of one target, least bending energy first, each with the number of starts that led there.
@@ -272,7 +317,8 @@ pub(crate) fn _inverse_solutions(
     search: Option<&Bound<'_, InverseSettings>>,
     method: &str,
 ) -> PyResult<Vec<(Row, usize)>> {
-    let plans = Plans::new(robot, model, settings)?;
+    let around = Surroundings::new(py, None, None)?;
+    let plans = Plans::new(robot, model, settings, &around)?;
     let engine = plans.engine(robot, bounds, search, method)?;
     let Engine::Arcs(inverse) = &engine else {
         let expected = "\"constant_curvature\" for all answers (inverse has one of the rod)";
@@ -294,7 +340,8 @@ pub(crate) fn _inverse_solutions(
 
 /// Columns of many inverses, each alone (`chain` false) or from the answer of the one before.
 #[pyfunction]
-#[pyo3(signature = (robot, targets, *, model, start, bounds, settings, search, method, threads, progress, chain))]
+#[pyo3(signature = (robot, targets, *, model, start, bounds, settings, search, method, threads, progress, chain,
+    obstacles, loads))]
 #[allow(clippy::too_many_arguments)] // The keywords of inverse_batch and track.
 pub(crate) fn _inverse_batch<'py>(
     py: Python<'py>,
@@ -309,8 +356,11 @@ pub(crate) fn _inverse_batch<'py>(
     threads: Option<&Bound<'py, PyAny>>,
     progress: Option<&Bound<'py, PyAny>>,
     chain: bool,
+    obstacles: &Bound<'py, PyAny>,
+    loads: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let plans = Plans::new(robot, model, settings)?;
+    let around = Surroundings::new(py, Some(obstacles), loads)?;
+    let plans = Plans::new(robot, model, settings, &around)?;
     let engine = plans.engine(robot, bounds, search, method)?;
     let targets = many_targets(targets)?;
     let pool = if chain {
@@ -321,8 +371,14 @@ pub(crate) fn _inverse_batch<'py>(
     };
     let pool = pool.as_deref();
     match &engine {
-        Engine::Arcs(inverse) => invert_many(py, &**inverse, &targets, start, pool, progress),
-        Engine::Rod(inverse) => invert_many(py, &**inverse, &targets, start, pool, progress),
+        Engine::Arcs(inverse) => {
+            invert_many(py, &**inverse, &targets, start, pool, progress, &around)
+        }
+        Engine::Rod(inverse) => {
+            let rows = invert_many(py, &**inverse, &targets, start, pool, progress, &around);
+            checked(py, Mutex::new(inverse.take_fault()))?;
+            rows
+        }
     }
 }
 
@@ -334,6 +390,7 @@ fn invert_many<'py, I: Inverter>(
     start: Option<&Bound<'py, PyAny>>,
     pool: Option<&ThreadPool>,
     progress: Option<&Bound<'py, PyAny>>,
+    around: &Surroundings,
 ) -> PyResult<Bound<'py, PyDict>>
 where
     I::Start: Send,
@@ -341,11 +398,13 @@ where
     let answers = if let Some(pool) = pool {
         let starts = many_starts(inverse, targets.len(), start)?;
         long_call::run(py, progress, |control| {
+            around.stopped_by(&control.stop);
             invert_rows(inverse, targets, &starts, pool, control)
         })?
     } else {
         let start = one_start(inverse, start)?;
         long_call::run(py, progress, |control| {
+            around.stopped_by(&control.stop);
             invert_path(inverse, targets, start.as_ref(), control)
         })?
     };

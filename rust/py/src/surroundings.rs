@@ -19,6 +19,7 @@ use crate::convert::invalid;
 use crate::loads::Loads;
 use crate::long_call;
 use crate::obstacle::{obstacles, raised};
+use crate::rod::Load;
 
 /// Obstacles, as Python knows them and as the core does, and loads.
 pub(crate) struct Surroundings {
@@ -139,17 +140,32 @@ impl<'r> Watched<'r> {
         Self { rod: rod.stopped_by(Arc::clone(&stop)), stop, fault }
     }
 
-    /// Solves from the state of an earlier shape.
-    pub(crate) fn shape_from(
+    /// Displacements and the shape, found from rest or from an earlier shape.
+    pub(crate) fn solve_load(
         &self,
-        start: &State,
-        displacements: &[f64],
-    ) -> Result<tdcr::Shape, InvalidInput> {
-        self.rod.robot().check_displacements(displacements)?;
+        load: Load,
+        start: Option<State>,
+    ) -> Result<(Vec<f64>, tdcr::Shape), InvalidInput> {
         let mut work = Workspace::default();
-        let report = self.rod.solve_from(start, displacements, &mut work)?;
+        let report = match (&load, start) {
+            (Load::Tensions(tensions), _) => self.rod.solve_tensions(tensions, &mut work)?,
+            (Load::Displacements(displacements), None) => {
+                let shape = self.shape(displacements)?;
+                return Ok((displacements.clone(), shape));
+            }
+            (Load::Displacements(displacements), Some(start)) => {
+                self.rod.robot().check_displacements(displacements)?;
+                self.rod.solve_from(&start, displacements, &mut work)?
+            }
+        };
         self.watch(&mut work);
-        Ok(self.rod.result(displacements, report, work))
+        let message = self.rod.message(&[], &work);
+        let state = self.rod.take_state(work);
+        let displacements = match load {
+            Load::Displacements(displacements) => displacements,
+            Load::Tensions(_) => self.rod.displacements(&state),
+        };
+        Ok((displacements, tdcr::Shape { state, report, message }))
     }
 
     fn watch(&self, work: &mut Workspace) {
@@ -216,13 +232,13 @@ pub(crate) fn checked(py: Python<'_>, fault: Mutex<Option<Fault>>) -> PyResult<(
 const LONG: usize = 400;
 
 /// Solves once without the GIL, where Ctrl-C can stop it, if that may take long; but for the GIL that Python functions of obstacles take; these see Ctrl-C too.
-pub(crate) fn solve(
+pub(crate) fn solve<T: Send>(
     py: Python<'_>,
     robot: &Robot,
     plan: &Plan,
     scene: &Scene,
-    job: impl FnOnce(&Watched<'_>) -> Result<tdcr::Shape, InvalidInput> + Send,
-) -> PyResult<tdcr::Shape> {
+    job: impl FnOnce(&Watched<'_>) -> Result<T, InvalidInput> + Send,
+) -> PyResult<T> {
     let fault = Mutex::new(None);
     let rod = LoadedRod::new(robot, plan, scene).map_err(|e| invalid(&e))?;
     let shape = if scene.calls_functions() || plan.second_derivatives() < LONG {

@@ -21,6 +21,19 @@ pub struct Answer {
     pub starts: usize,
 }
 
+impl Answer {
+    /// Of a target that was not sought.
+    pub(super) fn none() -> Self {
+        Self {
+            status: Status::NumericalError,
+            distance: f64::NAN,
+            angle: f64::NAN,
+            iterations: 0,
+            starts: 0,
+        }
+    }
+}
+
 /// What stood in the way, in a sentence: the bounds that hold back, and what freedom is spent on.
 pub(super) fn tell<S: Borrow<str>>(
     answer: &Answer,

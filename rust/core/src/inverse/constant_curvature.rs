@@ -12,7 +12,7 @@ use super::answer::{Answer, tell};
 use super::bounds::{Bounds, Draw, Reach};
 use super::chain::Chain;
 use super::rows::Inverter;
-use super::search::{Effort, Found, Search};
+use super::search::{Effort, Found, Freedom, Search};
 use super::{InverseSettings, Method, Target};
 use crate::constant_curvature::{self, Arc, ConstantCurvature, ConstantCurvatureSettings, Plan};
 use crate::error::InvalidInput;
@@ -206,7 +206,11 @@ impl<'a> ConstantCurvatureInverse<'a> {
             first: 0,
             starts,
             max_iterations: self.settings.max_iterations,
-            redundant: self.settings.least_energy && self.reach.freedoms > chain.aim.rows(),
+            freedom: if self.settings.least_energy && self.reach.freedoms > chain.aim.rows() {
+                Freedom::Smooth
+            } else {
+                Freedom::None
+            },
             method: self.settings.method,
             fall_back: self.settings.method == Method::Newton && starts > 1,
             nearest: true,

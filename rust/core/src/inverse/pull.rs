@@ -3,7 +3,8 @@
 
 use nalgebra::Vector6;
 
-use crate::rod::pulled::Pulled;
+use crate::robot::Robot;
+use crate::rod::balance::Balance;
 use crate::solve::fit::Problem;
 use crate::solve::quadratic::Rows;
 
@@ -11,9 +12,9 @@ use super::InverseSettings;
 use super::aim::Aim;
 
 /// Unknowns: tensions in such units that each is about the angle by which it bends the rod alone \[rad\].
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Pull<'a> {
-    pub(super) pulled: Pulled<'a>,
+    pub(super) rod: Box<dyn Balance + 'a>,
     pub(super) aim: Aim<'a>,
     /// Tension of a unit of every unknown.
     units: &'a [f64],
@@ -34,15 +35,16 @@ const PRECISION: f64 = 1e-6;
 
 impl<'a> Pull<'a> {
     pub(super) fn new(
-        pulled: Pulled<'a>,
+        rod: Box<dyn Balance + 'a>,
+        robot: &'a Robot,
+        lengths: &'a [f64],
         settings: &'a InverseSettings,
         units: &'a [f64],
         ranges: &'a [(f64, f64)],
     ) -> Self {
-        let (robot, lengths) = (pulled.robot(), pulled.rest_lengths());
         let finite = |(lower, upper): &(f64, f64)| lower.is_finite() || upper.is_finite();
         Self {
-            pulled,
+            rod,
             aim: Aim::new(robot, settings),
             units,
             ranges,
@@ -63,13 +65,13 @@ impl<'a> Pull<'a> {
         if !(self.sound && wanted.clone().eq(self.tensions.iter().copied())) {
             self.tensions.clear();
             self.tensions.extend(wanted);
-            self.sound = self.pulled.go(&self.tensions);
+            self.sound = self.rod.go(&self.tensions);
             if self.sound {
-                self.pulled.differentiate();
+                self.rod.differentiate();
             }
         }
         if self.sound {
-            let tool = self.pulled.tool;
+            let tool = self.rod.motion().tool;
             self.aim.place(tool.translation, || tool.rotation);
         }
         self.sound
@@ -84,7 +86,7 @@ impl<'a> Pull<'a> {
     pub(super) fn holding(&self, within: f64) -> Vec<(usize, bool)> {
         let mut out = Vec::new();
         for (k, (lower, upper)) in self.ranges.iter().enumerate() {
-            let displacement = self.pulled.displacement(k);
+            let displacement = self.rod.displacement(k);
             if displacement - lower <= within {
                 out.push((k, false));
             }
@@ -104,7 +106,7 @@ impl Problem<6> for Pull<'_> {
             return;
         }
         *residual = self.aim.residual();
-        self.aim.write_columns(&self.pulled.columns, jacobian);
+        self.aim.write_columns(&self.rod.motion().columns, jacobian);
         jacobian.iter_mut().zip(self.units).for_each(|(column, unit)| *column *= *unit);
     }
 
@@ -121,15 +123,16 @@ impl Problem<6> for Pull<'_> {
         let size = z.len();
         let rotates = self.aim.rotates();
         let push = self.aim.curvature(weights);
-        let Self { pulled, moved, turned, units, .. } = self;
-        pulled.curve(&push.force, &push.moment, moved, turned);
+        let Self { rod, moved, turned, units, .. } = self;
+        rod.motion_mut().curve(&push.force, &push.moment, moved, turned);
+        let columns = &rod.motion().columns;
         for a in 0..size {
-            let spin = &pulled.columns[a].1;
+            let spin = &columns[a].1;
             let row = push.row(spin);
             for b in 0..=a {
                 let mut sum = moved[a * size + b] + moved[b * size + a];
                 if rotates {
-                    let other = &pulled.columns[b].1;
+                    let other = &columns[b].1;
                     sum += push.rotation(&row, spin, other, turned[a * size + b]);
                 }
                 hessian[a * size + b] += units[a] * units[b] * sum;
@@ -147,12 +150,12 @@ impl Problem<6> for Pull<'_> {
         }
         let size = self.units.len();
         for (k, (lower, upper)) in self.ranges.iter().enumerate() {
-            let displacement = self.pulled.displacement(k);
+            let displacement = self.rod.displacement(k);
             for (sign, room) in [(1.0, upper - displacement), (-1.0, displacement - lower)] {
                 if !room.is_finite() {
                     continue;
                 }
-                let slope = |j| sign * self.pulled.displacement_slope(k, j) * self.units[j];
+                let slope = |j| sign * self.rod.displacement_slope(k, j) * self.units[j];
                 let norm = (0..size).map(|j| slope(j) * slope(j)).sum::<f64>().sqrt();
                 if norm > 0.0 {
                     let row = rows.push(size, room / norm);
@@ -168,7 +171,7 @@ impl Problem<6> for Pull<'_> {
         }
         let rows = self.ranges.iter().zip(self.lengths).enumerate();
         rows.fold(0.0, |most, (k, ((lower, upper), length))| {
-            let displacement = self.pulled.displacement(k);
+            let displacement = self.rod.displacement(k);
             most.max((displacement - upper).max(lower - displacement) / length)
         })
     }
@@ -214,7 +217,9 @@ mod tests {
     use super::super::rows::Inverter;
     use super::*;
     use crate::lie::{Pose, so3};
+    use crate::obstacle::{Obstacle, Sphere};
     use crate::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
+    use crate::rod::contact::{Loads, Scene};
     use crate::rod::{Plan, RodSettings};
 
     fn robot(n: usize) -> Robot {
@@ -224,7 +229,12 @@ mod tests {
             let routing = Routing::Angles { azimuth, radius: PerDisk::Same(0.008) };
             Tendon::new(routing, None, None, None).unwrap()
         };
-        let backbone = Backbone::new(BackboneSpec::straight(0.2, n)).unwrap();
+        let steel = BackboneSpec {
+            youngs_modulus: Some(200e9),
+            diameter: Some(vec![1e-3]),
+            ..BackboneSpec::straight(0.2, n)
+        };
+        let backbone = Backbone::new(steel).unwrap();
         Robot::new(backbone, (0..4).map(tendon).collect(), None, None, None).unwrap()
     }
 
@@ -244,20 +254,54 @@ mod tests {
             let turn = so3::exp(&Vector3::new(0.5, -0.3, 0.2));
             let translation = Vector3::new(0.05, 0.02, 0.15);
             pull.aim.at(Target::Pose(Pose { rotation: turn, translation }));
-            check(pull, &[0.9, 0.5, 0.0, 0.7], share);
+            check(pull, &[0.9, 0.5, 0.0, 0.7], share, (1e-4, 1e-6));
         }
     }
 
-    fn check(pull: &mut Pull<'_>, z: &[f64], share: f64) {
-        let h = 1e-4;
+    /// The same where it leans on a ball, under weight and a force and moment at the tip. What
+    /// leaning bends is left out of the second derivatives: they are not looked at.
+    #[test]
+    fn derivatives_agree_with_differences_in_contact() {
+        let settings = InverseSettings::default();
+        for (n, elements) in [(12, 1), (12, 2), (48, 1)] {
+            let robot = robot(n);
+            let plan = Plan::new(&robot, RodSettings { elements, ..RodSettings::default() });
+            let plan = plan.unwrap();
+            let ball = Sphere::new(&Vector3::new(0.02, 0.025, 0.1), 0.02).unwrap();
+            let loads = Loads {
+                disk_mass: 1e-3,
+                tip_force: Vector3::new(0.05, 0.02, -0.03),
+                tip_moment: Vector3::new(1e-3, -2e-3, 1e-3),
+                ..Loads::default()
+            };
+            let balls = [Obstacle::new(ball, false)];
+            let scene = Scene::new(&robot, &plan, &balls, Some(&loads), 0.0).unwrap();
+            let bounds = Bounds::default();
+            let inverse = RodInverse::new(&robot, &plan, &bounds, settings).unwrap();
+            let inverse = inverse.among(&scene).unwrap();
+            let mut work = inverse.buffers(None);
+            let pull = &mut work.pull;
+            pull.aim.at(Target::Position(Vector3::new(0.05, 0.02, 0.15)));
+            let z = [0.9, 0.5, 0.0, 0.7];
+            // Shapes are balanced to 5e-11 rad.
+            check(pull, &z, f64::INFINITY, (1e-3, 3e-6));
+            let tensions: Vec<f64> = z.iter().zip(pull.units).map(|(z, unit)| z * unit).collect();
+            assert!(pull.rod.go(&tensions));
+            let contacts = pull.rod.state().unwrap().contacts;
+            assert!(contacts.iter().any(|c| c.force.norm() > 0.0));
+        }
+    }
+
+    /// Steps of `h`, differences right to `near`.
+    fn check(pull: &mut Pull<'_>, z: &[f64], share: f64, (h, near): (f64, f64)) {
         let weights = Vector6::new(0.3, -0.7, 0.5, 0.4, 0.2, -0.6);
         let mut at = |z: &[f64]| {
             let (mut residual, mut jacobian) = (Vector6::zeros(), vec![Vector6::zeros(); 4]);
             pull.evaluate(z, &mut residual, &mut jacobian);
             let mut hessian = vec![0.0; 16];
             pull.add_hessian(z, &weights, &mut hessian);
-            let own: Vec<f64> = (0..4).map(|k| pull.pulled.displacement(k)).collect();
-            let slope = |k: usize, j: usize| pull.pulled.displacement_slope(k, j) * pull.units[j];
+            let own: Vec<f64> = (0..4).map(|k| pull.rod.displacement(k)).collect();
+            let slope = |k: usize, j: usize| pull.rod.displacement_slope(k, j) * pull.units[j];
             let slopes: Vec<f64> = (0..16).map(|i| slope(i / 4, i % 4)).collect();
             (residual, jacobian, hessian, own, slopes)
         };
@@ -272,10 +316,10 @@ mod tests {
             // None is pulled below zero: differences of second order to one side.
             let (once, twice, none) = (moved(h), moved(2.0 * h), moved(0.0));
             let slope = (once.0 * 4.0 - twice.0 - none.0 * 3.0) / (2.0 * h);
-            assert!((slope - jacobian[b]).amax() < 1e-6, "{b} {slope} {}", jacobian[b]);
+            assert!((slope - jacobian[b]).amax() < near, "{b} {slope} {}", jacobian[b]);
             for k in 0..4 {
                 let slope = (4.0 * once.3[k] - twice.3[k] - 3.0 * none.3[k]) / (2.0 * h);
-                assert!((slope - slopes[4 * k + b]).abs() < 1e-8, "{k} {b} {slope}");
+                assert!((slope - slopes[4 * k + b]).abs() < 1e-2 * near, "{k} {b} {slope}");
                 if k >= b {
                     let bent = weights.dot(&(once.1[k] - none.1[k])) / h;
                     off += (hessian[4 * k + b] - bent).powi(2);

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::{Answer, InverseSettings, Target};
 use crate::batch::Control;
 use crate::error::InvalidInput;
+use crate::model::State;
 use crate::robot::Robot;
-use crate::status::Status;
 
 /// Answers, row by row.
 #[derive(Clone, Debug, Default)]
@@ -27,15 +27,8 @@ const ROWS_PER_JOB: usize = 8;
 
 impl InverseRows {
     fn blank(rows: usize, tendons: usize) -> Self {
-        let blank = Answer {
-            status: Status::NumericalError,
-            distance: f64::NAN,
-            angle: f64::NAN,
-            iterations: 0,
-            starts: 0,
-        };
         let none = vec![f64::NAN; rows * tendons];
-        Self { displacements: none.clone(), tensions: none, answers: vec![blank; rows] }
+        Self { displacements: none.clone(), tensions: none, answers: vec![Answer::none(); rows] }
     }
 }
 
@@ -79,6 +72,11 @@ pub trait Inverter: Sync {
 
     /// Their tensions, in the unit of the results; untouched where the model knows no forces.
     fn write_tensions(&self, work: &Self::Work<'_>, place: &mut [f64]);
+
+    /// The shape that the last solve in `work` found, where displacements do not say which one it is.
+    fn state(&self, _work: &mut Self::Work<'_>) -> Option<State> {
+        None
+    }
 
     /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
     fn message(&self, answer: &Answer, work: &Self::Work<'_>) -> String;

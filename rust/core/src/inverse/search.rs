@@ -15,6 +15,8 @@ const CANDIDATES: usize = 4;
 const POLISH: usize = 300;
 /// Steps that lower the energy.
 const LOWER: usize = 500;
+/// The same where derivatives jump.
+const LOWER_KINKS: usize = 30;
 
 /// Buffers of a search, and the point it found.
 #[derive(Clone, Debug, Default)]
@@ -37,6 +39,16 @@ pub(super) struct Found {
     pub(super) starts: usize,
 }
 
+/// Freedom that is spent on the energy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Freedom {
+    /// None is left, or it is not to be spent.
+    None,
+    Smooth,
+    /// Derivatives jump: the energy is least where no step leads lower.
+    Kinked,
+}
+
 /// What to search for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort<'s> {
@@ -44,8 +56,8 @@ pub(super) struct Effort<'s> {
     pub(super) first: usize,
     pub(super) starts: usize,
     pub(super) max_iterations: usize,
-    /// There is freedom left for the energy.
-    pub(super) redundant: bool,
+    /// What the target leaves, to spend on the energy.
+    pub(super) freedom: Freedom,
     pub(super) method: Method,
     /// A swarm is the last resort.
     pub(super) fall_back: bool,
@@ -151,11 +163,14 @@ impl Search<'_> {
         space: &Space,
         effort: Effort<'_>,
     ) -> Status {
-        if !effort.redundant {
-            return Status::Converged;
-        }
-        match self.fit.lower_energy(problem, &space.region, &mut self.point, LOWER) {
+        let (kinks, most) = match effort.freedom {
+            Freedom::None => return Status::Converged,
+            Freedom::Smooth => (false, LOWER),
+            Freedom::Kinked => (true, LOWER_KINKS),
+        };
+        match self.fit.lower_energy(problem, &space.region, &mut self.point, most) {
             Ending::Met => Status::Converged,
+            _ if kinks && problem.met(&self.fit.residual) => Status::Converged,
             _ => Status::IterationLimit,
         }
     }

@@ -1,6 +1,7 @@
 //! The strain-energy rod: general routing, pre-bent backbones, any number of tendons.
 
 mod ascent;
+pub(crate) mod balance;
 mod chain;
 pub mod contact;
 mod element;

@@ -100,14 +100,7 @@ impl<'r> Rod<'r> {
             let expected = "sliding tendons where tensions are given";
             return Err(InvalidInput::new("tendons", expected, "\"proportional\""));
         }
-        if tensions.len() != self.plan.rest_lengths.len() {
-            let expected = format!("{} values, one per tendon", self.plan.rest_lengths.len());
-            return Err(InvalidInput::new("tensions", expected, tensions.len()));
-        }
-        if let Some(bad) = tensions.iter().find(|t| !(t.is_finite() && **t >= 0.0)) {
-            let expected = "finite tensions of 0 or more";
-            return Err(InvalidInput::new("tensions", expected, format!("{bad:?}")));
-        }
+        self.plan.check_tensions(tensions)?;
         let mut budget = self.plan.settings.max_iterations;
         self.listen(work);
         let chain = &mut work.chain;

@@ -164,6 +164,19 @@ impl Plan {
         (0..self.data.len()).map(|i| self.length(i)).sum()
     }
 
+    /// Whether tensions are those of a solve.
+    pub(super) fn check_tensions(&self, tensions: &[f64]) -> Result<(), InvalidInput> {
+        if tensions.len() != self.rest_lengths.len() {
+            let expected = format!("{} values, one per tendon", self.rest_lengths.len());
+            return Err(InvalidInput::new("tensions", expected, tensions.len()));
+        }
+        if let Some(bad) = tensions.iter().find(|t| !(t.is_finite() && **t >= 0.0)) {
+            let expected = "finite tensions of 0 or more";
+            return Err(InvalidInput::new("tensions", expected, format!("{bad:?}")));
+        }
+        Ok(())
+    }
+
     /// Unknowns of an element.
     pub(super) fn unknowns(&self) -> usize {
         if self.settings.axial { 4 } else { 3 }

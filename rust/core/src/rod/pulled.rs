@@ -1,20 +1,19 @@
-//! The rod as a smooth function of its tensions: what an inverse descends on.
+//! The rod alone under tensions.
 //!
-//! Given tensions every subsegment is a minimum of its own, so that no set of displacements is infeasible and no
-//! tendon slack. From one balance to the next leads the step `dx = −H⁻¹ (g + Aᵀ dT)` of
+//! Given tensions every subsegment is a minimum of its own. From one balance to the next leads the step `dx = −H⁻¹ (g + Aᵀ dT)` of
 //! [`Chain`](super::chain::Chain), which is of second order, and Newton steps; what is left of g then counts to
 //! first order in all that is read off.
 
 use nalgebra::Vector3;
 
 use super::ascent::EASY;
+use super::balance::{Balance, Motion, Twist};
 use super::chain::{Chain, JUMP};
 use super::model::{Rod, read_state};
 use super::plan::Plan;
 use super::sweep::{Solved, Sweep};
 use crate::lie::{Pose, so3};
 use crate::model::State;
-use crate::robot::Robot;
 use crate::solve::quadratic::dot;
 
 /// Balance that is near enough: its square is below every tolerance \[rad of the own stiffness\].
@@ -54,18 +53,8 @@ pub(crate) struct Pulled<'r> {
     at: usize,
     sweep: Sweep,
     frames: Vec<Pose>,
-    /// The tool in the base's frame.
-    pub(crate) tool: Pose,
-    /// Velocity of the tool and angular velocity by every tension, in the base's axes.
-    pub(crate) columns: Vec<Twist>,
-    /// Every piece's share of them.
-    shares: Vec<Twist>,
-    /// Angular velocities of the subsegment's middle that is looked at.
-    spins: Vec<Vector3<f64>>,
+    motion: Motion,
 }
-
-/// A velocity and an angular velocity.
-type Twist = (Vector3<f64>, Vector3<f64>);
 
 impl<'r> Pulled<'r> {
     /// At rest.
@@ -76,16 +65,14 @@ impl<'r> Pulled<'r> {
             at: 0,
             sweep: Sweep::default(),
             frames: Vec::new(),
-            tool: Pose::identity(),
-            columns: Vec::new(),
-            shares: Vec::new(),
-            spins: Vec::new(),
+            motion: Motion::new(),
         };
         pulled.rest();
         pulled
     }
 
-    fn plan(&self) -> &'r Plan {
+    /// The plan it was made of.
+    pub(crate) fn plan(&self) -> &'r Plan {
         self.rod.plan
     }
 
@@ -94,66 +81,9 @@ impl<'r> Pulled<'r> {
         &self.rod
     }
 
-    /// The robot it was made of.
-    pub(crate) fn robot(&self) -> &'r Robot {
-        self.rod.robot
-    }
-
     /// Length of every tendon at rest \[m\].
     pub(crate) fn rest_lengths(&self) -> &'r [f64] {
         &self.plan().rest_lengths
-    }
-
-    /// Forgets all but the rest shape, so that what follows does not depend on what went before.
-    pub(crate) fn rest(&mut self) {
-        let plan = self.plan();
-        for point in &mut self.points {
-            point.sound = false;
-        }
-        let Point { chain, sound } = &mut self.points[0];
-        chain.rest(plan);
-        chain.unbound(plan);
-        chain.taut.clear();
-        chain.taut.resize(plan.rest_lengths.len(), true);
-        chain.assemble(plan, EASY);
-        *sound = true;
-        self.at = 0;
-    }
-
-    /// Puts a shape with its tensions in place of the rest shape; false when it is no balance.
-    pub(crate) fn begin(&mut self, start: &State) -> bool {
-        let plan = self.plan();
-        self.rest();
-        let Point { chain, sound } = &mut self.points[0];
-        let Chain { strains, tensions, .. } = chain;
-        *sound = read_state(start, plan, strains, tensions).is_ok() && settle(plan, chain);
-        let began = *sound;
-        if !began {
-            self.rest();
-        }
-        began
-    }
-
-    /// Tensions in the plan's unit of the point at hand.
-    pub(crate) fn tensions(&self) -> &[f64] {
-        &self.points[self.at].chain.tensions
-    }
-
-    /// Goes to the balance under tensions, in the plan's unit; false when none is found from the nearest known
-    /// one.
-    pub(crate) fn go(&mut self, tensions: &[f64]) -> bool {
-        let away = self.points.each_ref().map(|point| point.away(tensions));
-        let nearest = (0..3).fold(0, |best, k| if away[k] < away[best] { k } else { best });
-        self.at = nearest;
-        let mut share = 1.0;
-        for _ in 0..STEPS {
-            if self.points[self.at].away(tensions) == 0.0 {
-                return true;
-            }
-            let Some(next) = self.step(tensions, &mut share) else { return false };
-            self.at = next;
-        }
-        self.points[self.at].away(tensions) == 0.0
     }
 
     /// One step towards tensions, of a share of the way that is left; the point that it leads to.
@@ -205,31 +135,6 @@ impl<'r> Pulled<'r> {
         })
     }
 
-    /// Change of every tendon's own length from rest, without what its tension stretches it by, and its
-    /// derivatives by the tensions: `−(S + C)`, row by row \[m\].
-    pub(crate) fn displacement(&self, k: usize) -> f64 {
-        let (plan, chain) = (self.plan(), &self.points[self.at].chain);
-        chain.over[k] + chain.slope[k]
-            - plan.compliance[k] * chain.tensions[k]
-            - plan.rest_lengths[k]
-    }
-
-    /// Derivative of a displacement by a tension.
-    pub(crate) fn displacement_slope(&self, k: usize, by: usize) -> f64 {
-        let chain = &self.points[self.at].chain;
-        let count = chain.tensions.len();
-        let give = if k == by { self.plan().compliance[k] } else { 0.0 };
-        -chain.schur[k.max(by) * count + k.min(by)] - give
-    }
-
-    /// Places the tool, and its velocities by the tensions.
-    pub(crate) fn differentiate(&mut self) {
-        match self.plan().unknowns() {
-            3 => self.differentiate_of::<3>(),
-            _ => self.differentiate_of::<4>(),
-        }
-    }
-
     fn differentiate_of<const D: usize>(&mut self) {
         let plan = self.plan();
         let size = plan.width();
@@ -241,73 +146,27 @@ impl<'r> Pulled<'r> {
             frame = frame.compose(end);
             self.frames.push(frame);
         }
-        self.tool = frame.compose(self.rod.robot.tool());
-        self.columns.clear();
-        self.columns.resize(chain.tensions.len(), (Vector3::zeros(), Vector3::zeros()));
-        self.shares.clear();
-        let (columns, shares) = (&mut self.columns, &mut self.shares);
+        let tool = frame.compose(self.rod.robot.tool());
+        let motion = &mut self.motion;
+        motion.begin(tool, chain.tensions.len());
         // What balance the strains lack moves the tool by this.
         let mut lack: Twist = (Vector3::zeros(), Vector3::zeros());
         let at = Solved { strains: &chain.strains, factors: &chain.factors, frames: &self.frames };
-        self.sweep.run::<D>(plan, &at, &self.tool.translation, |i, rows| {
+        self.sweep.run::<D>(plan, &at, &tool.translation, |i, rows| {
             let product = |image: &[f64]| {
                 let by = |k: usize| -dot(&rows[k * size..(k + 1) * size], image);
                 (Vector3::new(by(0), by(1), by(2)), Vector3::new(by(3), by(4), by(5)))
             };
             for p in plan.starts[i]..plan.starts[i + 1] {
-                let share = product(&chain.images[p * size..(p + 1) * size]);
-                let sum = &mut columns[plan.pieces[p].tendon];
-                (sum.0, sum.1) = (sum.0 + share.0, sum.1 + share.1);
-                shares.push(share);
+                motion.add(plan.pieces[p].tendon, product(&chain.images[p * size..(p + 1) * size]));
             }
+            motion.next();
             let share = product(&chain.gradients[i * size..(i + 1) * size]);
             lack = (lack.0 + share.0, lack.1 + share.1);
         });
-        self.tool.translation += lack.0;
-        self.tool.rotation = so3::exp(&lack.1) * self.tool.rotation;
-    }
-
-    /// Second derivatives of the tool's place times a force and of its rotation times a moment, by two tensions, into
-    /// two square matrices: `(a, b)` of the first summed with `(b, a)`; of the second, the change of column a by
-    /// tension b. Where the tool was placed last, and as if tensions turned every subsegment by as much as they do
-    /// there: what is left out is that of its strains by the tensions, small unless it is about to buckle.
-    pub(crate) fn curve(
-        &mut self,
-        force: &Vector3<f64>,
-        moment: &Vector3<f64>,
-        moved: &mut Vec<f64>,
-        turned: &mut Vec<f64>,
-    ) {
-        let plan = self.plan();
-        let count = self.columns.len();
-        for matrix in [&mut *moved, &mut *turned] {
-            matrix.clear();
-            matrix.resize(count * count, 0.0);
-        }
-        let Self { shares, spins, .. } = self;
-        spins.clear();
-        spins.resize(count, Vector3::zeros());
-        for i in 0..plan.data.len() {
-            let range = plan.starts[i]..plan.starts[i + 1];
-            let pieces = &plan.pieces[range.clone()];
-            let halve = |spins: &mut [Vector3<f64>]| {
-                for (piece, share) in pieces.iter().zip(&shares[range.clone()]) {
-                    spins[piece.tendon] += share.1 * 0.5;
-                }
-            };
-            // Half a subsegment turns the other half.
-            halve(spins);
-            for (piece, share) in pieces.iter().zip(&shares[range.clone()]) {
-                let (swung, spun) = (share.0.cross(force), share.1.cross(moment));
-                let row = piece.tendon * count..(piece.tendon + 1) * count;
-                let rows = moved[row.clone()].iter_mut().zip(&mut turned[row]);
-                for ((moved, turned), spin) in rows.zip(spins.iter()) {
-                    *moved += spin.dot(&swung);
-                    *turned += spin.dot(&spun);
-                }
-            }
-            halve(spins);
-        }
+        let tool = &mut motion.tool;
+        tool.translation += lack.0;
+        tool.rotation = so3::exp(&lack.1) * tool.rotation;
     }
 
     /// Where nothing was solved yet: by what turns of the subsegments shorten every tendon, linearly \[m\], into
@@ -347,6 +206,84 @@ impl<'r> Pulled<'r> {
     /// Tension of one unit of the plan in the unit of the results.
     pub(crate) fn unit(&self) -> f64 {
         self.plan().unit
+    }
+}
+
+impl Balance for Pulled<'_> {
+    fn rest(&mut self) {
+        let plan = self.plan();
+        for point in &mut self.points {
+            point.sound = false;
+        }
+        let Point { chain, sound } = &mut self.points[0];
+        chain.rest(plan);
+        chain.unbound(plan);
+        chain.taut.clear();
+        chain.taut.resize(plan.rest_lengths.len(), true);
+        chain.assemble(plan, EASY);
+        *sound = true;
+        self.at = 0;
+    }
+
+    fn begin(&mut self, start: &State) -> bool {
+        let plan = self.plan();
+        self.rest();
+        let Point { chain, sound } = &mut self.points[0];
+        let Chain { strains, tensions, .. } = chain;
+        *sound = read_state(start, plan, strains, tensions).is_ok() && settle(plan, chain);
+        let began = *sound;
+        if !began {
+            self.rest();
+        }
+        began
+    }
+
+    fn tensions(&self) -> &[f64] {
+        &self.points[self.at].chain.tensions
+    }
+
+    fn go(&mut self, tensions: &[f64]) -> bool {
+        let away = self.points.each_ref().map(|point| point.away(tensions));
+        let nearest = (0..3).fold(0, |best, k| if away[k] < away[best] { k } else { best });
+        self.at = nearest;
+        let mut share = 1.0;
+        for _ in 0..STEPS {
+            if self.points[self.at].away(tensions) == 0.0 {
+                return true;
+            }
+            let Some(next) = self.step(tensions, &mut share) else { return false };
+            self.at = next;
+        }
+        self.points[self.at].away(tensions) == 0.0
+    }
+
+    fn differentiate(&mut self) {
+        match self.plan().unknowns() {
+            3 => self.differentiate_of::<3>(),
+            _ => self.differentiate_of::<4>(),
+        }
+    }
+
+    fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    fn motion_mut(&mut self) -> &mut Motion {
+        &mut self.motion
+    }
+
+    fn displacement(&self, k: usize) -> f64 {
+        let (plan, chain) = (self.plan(), &self.points[self.at].chain);
+        chain.over[k] + chain.slope[k]
+            - plan.compliance[k] * chain.tensions[k]
+            - plan.rest_lengths[k]
+    }
+
+    fn displacement_slope(&self, k: usize, by: usize) -> f64 {
+        let chain = &self.points[self.at].chain;
+        let count = chain.tensions.len();
+        let give = if k == by { self.plan().compliance[k] } else { 0.0 };
+        -chain.schur[k.max(by) * count + k.min(by)] - give
     }
 }
 

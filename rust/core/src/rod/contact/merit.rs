@@ -73,7 +73,8 @@ pub(super) struct Merit {
     pub(super) entries: Vec<Entry>,
     /// Every point of every disk.
     pub(super) spots: Vec<Spot>,
-    /// What tendons are longer than their bounds, elasticity left out \[m\], and their tensions.
+    /// What tendons are longer than their bounds (under given tensions, than at rest), elasticity left out \[m\], and
+    /// their tensions.
     pub(super) over: Vec<f64>,
     pub(super) tensions: Vec<f64>,
     /// What these would be if tendons could push.
@@ -83,6 +84,15 @@ pub(super) struct Merit {
     pub(super) size: f64,
     local: Local,
     near: Vec<Near>,
+}
+
+/// What is given of the tendons.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Drive<'a> {
+    /// How long they may be at most, elasticity left out (infinite: free) \[m\].
+    Lengths(&'a [f64]),
+    /// Tensions.
+    Tensions(&'a [f64]),
 }
 
 /// An estimate of a contact's multiplier, with the plane that the obstacle's part was there.
@@ -142,23 +152,37 @@ impl Estimates {
 }
 
 impl Merit {
-    /// Evaluates the strains in [`Merit::strains`] for bounds of the tendons (infinite: free) and a share of
-    /// the loads. `reach`: how far off parts of obstacles are looked at \[m\].
+    /// Evaluates the strains in [`Merit::strains`] for what is given of the tendons and a share of the loads.
+    /// `reach`: how far off parts of obstacles are looked at \[m\].
     pub(super) fn evaluate(
         &mut self,
         plan: &Plan,
         scene: &Scene,
-        bounds: &[f64],
+        drive: Drive<'_>,
         share: f64,
         estimates: &Estimates,
         reach: f64,
     ) -> Result<(), Fault> {
         match plan.unknowns() {
-            3 => self.place::<3>(plan, bounds.len()),
-            _ => self.place::<4>(plan, bounds.len()),
+            3 => self.place::<3>(plan),
+            _ => self.place::<4>(plan),
         }
         self.tensions.clear();
         self.pulls.clear();
+        match drive {
+            Drive::Lengths(bounds) => self.hold(plan, bounds, estimates),
+            Drive::Tensions(tensions) => self.pull(plan, tensions),
+        }
+        for (frame, force) in self.frames.iter().zip(&scene.forces) {
+            let work = share * force.dot(&frame.translation);
+            self.value -= work;
+            self.size += work.abs();
+        }
+        self.touch(scene, estimates, reach)
+    }
+
+    /// Tendons of bounded length.
+    fn hold(&mut self, plan: &Plan, bounds: &[f64], estimates: &Estimates) {
         for (k, bound) in bounds.iter().enumerate() {
             let give = estimates.tendon_give[k];
             let all = give + plan.compliance[k];
@@ -170,20 +194,25 @@ impl Merit {
             self.value += 0.5 * all * tension * tension;
             self.size += 0.5 * all * tension * tension;
         }
-        for (frame, force) in self.frames.iter().zip(&scene.forces) {
-            let work = share * force.dot(&frame.translation);
-            self.value -= work;
-            self.size += work.abs();
-        }
-        self.touch(scene, estimates, reach)
     }
 
-    fn place<const D: usize>(&mut self, plan: &Plan, tendons: usize) {
+    /// Tendons of given tension.
+    fn pull(&mut self, plan: &Plan, tensions: &[f64]) {
+        for (k, tension) in tensions.iter().enumerate() {
+            self.size += tension * self.over[k];
+            self.over[k] -= plan.rest_lengths[k];
+            self.value += tension * self.over[k];
+        }
+        self.tensions.extend_from_slice(tensions);
+        self.pulls.extend_from_slice(tensions);
+    }
+
+    fn place<const D: usize>(&mut self, plan: &Plan) {
         let size = plan.width();
         self.frames.clear();
         self.ends.clear();
         self.over.clear();
-        self.over.resize(tendons, 0.0);
+        self.over.resize(plan.rest_lengths.len(), 0.0);
         self.value = 0.0;
         let mut frame = Pose::identity();
         self.frames.push(frame);

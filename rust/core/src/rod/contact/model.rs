@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::descent::{Descent, Left, Surroundings};
+use super::climb::{Given, Kept, REACH};
+use super::descent::{Descent, Left};
 use super::merit::Held;
 use super::scene::{Point, Scene};
 use crate::error::InvalidInput;
@@ -19,48 +20,26 @@ use crate::rod::settings::TendonRule;
 use crate::shape::Contact;
 use crate::status::Status;
 
-/// Share of the load that is taken first among obstacles, the least, and steps that make the next one longer.
-const FIRST: f64 = 0.25;
-const SHORTEST: f64 = 1e-3;
-const EASY: usize = 10;
-/// Evaluations that one load step may take.
-const PATIENCE: usize = 200;
-/// Parts of obstacles within this share of a subsegment are looked at, and points may slip by this share of
-/// one in one step.
-const REACH: f64 = 0.5;
-const SLIP: f64 = 0.25;
 /// Contacts are listed up to this gap, in shares of the robot's length.
 const TOUCH: f64 = 1e-9;
-/// Compliance of a contact, as a share of what the rod gives there, and the least of tendons, as one of that at the tip.
-const GIVE: f64 = 0.1;
-const LEAST: f64 = 0.04;
-
 /// Buffers of a solve.
 #[derive(Debug, Default)]
 pub struct Workspace {
-    state: State,
-    descent: Descent,
+    pub(super) state: State,
+    pub(super) descent: Descent,
     /// For the compliance of the tendons at rest.
-    chain: Chain,
-    /// Strains and bounds of the last solve, or at the last load that was reached.
-    kept: Kept,
-    left: Left,
-    ending: Ending,
+    pub(super) chain: Chain,
+    /// The last solve, or the last load that was reached.
+    pub(super) kept: Kept,
+    pub(super) left: Left,
+    pub(super) ending: Ending,
     /// Share of the load that was reached.
-    load: f64,
+    pub(super) load: f64,
     /// Saddles left on the way.
-    nudged: usize,
+    pub(super) nudged: usize,
     /// How deep the undeformed robot is in an obstacle, which, and at which disk.
-    sunk: Option<(f64, usize, usize)>,
-    fault: Option<Fault>,
-}
-
-#[derive(Debug, Default)]
-struct Kept {
-    strains: Vec<f64>,
-    tensions: Vec<f64>,
-    forces: Vec<Held>,
-    bounds: Vec<f64>,
+    pub(super) sunk: Option<(f64, usize, usize)>,
+    pub(super) fault: Option<Fault>,
 }
 
 impl Workspace {
@@ -96,7 +75,7 @@ impl<'r> LoadedRod<'r> {
         Self { rod: self.rod.stopped_by(stop), ..self }
     }
 
-    fn plan(&self) -> &'r Plan {
+    pub(super) fn plan(&self) -> &'r Plan {
         self.rod.plan
     }
 
@@ -112,13 +91,12 @@ impl<'r> LoadedRod<'r> {
         work: &mut Workspace,
     ) -> Result<Report, InvalidInput> {
         let plan = self.plan();
-        self.begin(displacements, work);
+        self.begin(work);
         let Descent { here, estimates, .. } = &mut work.descent;
         read_state(start, plan, &mut here.strains, &mut estimates.tensions)?;
         let own = estimates.tensions.iter().zip(&plan.compliance);
         let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, give))| l - t * give);
-        work.kept.bounds.clear();
-        work.kept.bounds.extend(from);
+        work.kept.given = Some(Given::Lengths(from.collect()));
         // A fault comes again, and is told, where the shape is evaluated.
         if self.sink(work).is_err() {
             work.sunk = None;
@@ -128,8 +106,29 @@ impl<'r> LoadedRod<'r> {
         self.resume(displacements, work)
     }
 
+    /// Displacements under which a shape has the lengths and tensions that it has; see [`Rod::displacements`].
+    #[must_use]
+    pub fn displacements(&self, state: &State) -> Vec<f64> {
+        self.rod.displacements(state)
+    }
+
+    /// The shape under given tensions, in the unit of the results: displacements are then what it has
+    /// ([`Self::displacements`]). Tensions, loads and contacts grow together from rest.
+    ///
+    /// # Errors
+    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
+    pub fn solve_tensions(
+        &self,
+        tensions: &[f64],
+        work: &mut Workspace,
+    ) -> Result<Report, InvalidInput> {
+        self.plan().check_tensions(tensions)?;
+        let tensions = tensions.iter().map(|tension| tension / self.plan().unit).collect();
+        Ok(self.rise(&Given::Tensions(tensions), work))
+    }
+
     /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
-    fn recall(&self, start: &State, work: &mut Workspace) {
+    pub(super) fn recall(&self, start: &State, work: &mut Workspace) {
         let (plan, base) = (self.plan(), self.rod.robot.base());
         let reach = REACH * self.shortest();
         let mut near = Vec::new();
@@ -159,113 +158,8 @@ impl<'r> LoadedRod<'r> {
         work.descent.estimates.forces.sort_by_key(|held| held.key);
     }
 
-    /// Length of the shortest subsegment \[m\].
-    fn shortest(&self) -> f64 {
-        let plan = self.plan();
-        (0..plan.data.len()).map(|i| plan.length(i)).fold(f64::INFINITY, f64::min)
-    }
-
-    /// Puts the rest shape without multipliers, and compliances that are small against the rod's.
-    fn begin(&self, displacements: &[f64], work: &mut Workspace) {
-        let plan = self.plan();
-        let chain = &mut work.chain;
-        chain.rest(plan);
-        chain.bound(plan, displacements);
-        chain.give = 0.0;
-        chain.assemble(plan, f64::INFINITY);
-        work.descent.here.strains.clone_from(&chain.strains);
-        self.stiffen(displacements, work);
-        let estimates = &mut work.descent.estimates;
-        estimates.tensions.clear();
-        estimates.tensions.resize(displacements.len(), 0.0);
-        estimates.forces.clear();
-    }
-
-    fn stiffen(&self, displacements: &[f64], work: &mut Workspace) {
-        let (plan, count) = (self.plan(), displacements.len());
-        let estimates = &mut work.descent.estimates;
-        contact_gives(plan, &mut estimates.gives);
-        let least = LEAST * estimates.gives.last().copied().unwrap_or_default();
-        estimates.stiffness = 1.0;
-        estimates.tendon_give.clear();
-        let own = (0..count).map(|k| work.chain.schur[k * (count + 1)].max(least));
-        estimates.tendon_give.extend(own);
-    }
-
-    /// From the shape in the descent, with a share of the load there, to the whole.
-    fn climb(
-        &self,
-        displacements: &[f64],
-        from: &[f64],
-        work: &mut Workspace,
-        budget: &mut usize,
-    ) -> Result<(), Fault> {
-        let plan = self.plan();
-        let wanted: Vec<f64> =
-            plan.rest_lengths.iter().zip(displacements).map(|(l, d)| l + d).collect();
-        let cold = from.is_empty();
-        let shortest = self.shortest();
-        let mut stride = if self.scene.obstacles.is_empty() || !cold { 1.0 } else { FIRST };
-        (work.load, work.nudged) = (0.0, 0);
-        keep(&mut work.kept, &work.descent);
-        while work.load < 1.0 {
-            let next = (work.load + stride).min(1.0);
-            let start = |k: usize| if cold { plan.rest_lengths[k] } else { from[k] };
-            let bounds: Vec<f64> = (0..wanted.len())
-                .map(|k| {
-                    let start = if start(k).is_finite() { start(k) } else { wanted[k] };
-                    // Tendons are let out before others are pulled.
-                    if wanted[k] < start { start + next * (wanted[k] - start) } else { wanted[k] }
-                })
-                .collect();
-            let around = Surroundings {
-                plan,
-                scene: self.scene,
-                share: if cold { next } else { 1.0 },
-                bounds: &bounds,
-                reach: REACH * shortest,
-                slip: SLIP * shortest,
-                sides: work.sunk.is_none(),
-                stop: self.rod.stop.as_deref(),
-            };
-            let mut patience = PATIENCE.min(*budget);
-            *budget -= patience;
-            let before = patience;
-            let (ending, left) = work.descent.go(&around, &mut patience)?;
-            *budget += patience;
-            work.left = left;
-            if ending == Ending::Stopped {
-                work.ending = ending;
-                return Ok(());
-            }
-            if ending == Ending::Converged {
-                work.load = next;
-                work.nudged += left.nudged;
-                stride *= if before - patience <= EASY { 2.0 } else { 1.0 };
-                keep(&mut work.kept, &work.descent);
-                work.kept.bounds = bounds;
-                self.stiffen(displacements, work);
-                continue;
-            }
-            work.descent.here.strains.clone_from(&work.kept.strains);
-            work.descent.estimates.tensions.clone_from(&work.kept.tensions);
-            work.descent.estimates.forces.clone_from(&work.kept.forces);
-            self.stiffen(displacements, work);
-            stride *= 0.25;
-            if stride < SHORTEST || *budget == 0 {
-                work.ending = if *budget == 0 && !left.locked { Ending::Spent } else { ending };
-                let mut once = 1;
-                let (_, here) = work.descent.go(&around, &mut once)?;
-                work.left = Left { locked: left.locked, ..here };
-                return Ok(());
-            }
-        }
-        work.ending = Ending::Converged;
-        Ok(())
-    }
-
     /// How deep the undeformed robot is in the obstacles.
-    fn sink(&self, work: &mut Workspace) -> Result<(), Fault> {
+    pub(super) fn sink(&self, work: &mut Workspace) -> Result<(), Fault> {
         work.sunk = None;
         let mut frame = Pose::identity();
         let plan = self.plan();
@@ -288,6 +182,12 @@ impl<'r> LoadedRod<'r> {
     }
 
     fn finish(&self, work: &mut Workspace, evaluations: usize) -> Report {
+        self.written(work);
+        told(work.ending, work.left.worst(), evaluations)
+    }
+
+    /// The shape at hand, written out.
+    pub(super) fn written<'w>(&self, work: &'w mut Workspace) -> &'w State {
         let plan = self.plan();
         let base = self.rod.robot.base();
         let Workspace { state, descent, .. } = work;
@@ -309,7 +209,25 @@ impl<'r> LoadedRod<'r> {
                 force: normal * (entry.force * plan.unit),
             });
         }
-        told(work.ending, work.left.worst(), evaluations)
+        &work.state
+    }
+
+    pub(super) fn scene(&self) -> &'r Scene {
+        self.scene
+    }
+
+    /// Greatest lengths of the tendons under displacements.
+    fn lengths(&self, displacements: &[f64]) -> Given {
+        let rest = &self.plan().rest_lengths;
+        Given::Lengths(rest.iter().zip(displacements).map(|(l, d)| l + d).collect())
+    }
+
+    fn rise(&self, wanted: &Given, work: &mut Workspace) -> Report {
+        self.run(work, |work, budget| {
+            self.begin(work);
+            self.sink(work)?;
+            self.climb(wanted, None, work, budget, self.rod.stop.as_deref())
+        })
     }
 
     fn run(
@@ -329,12 +247,6 @@ impl<'r> LoadedRod<'r> {
     }
 }
 
-fn keep(kept: &mut Kept, descent: &Descent) {
-    kept.strains.clone_from(&descent.here.strains);
-    kept.tensions.clone_from(&descent.estimates.tensions);
-    kept.forces.clone_from(&descent.estimates.forces);
-}
-
 impl Model for LoadedRod<'_> {
     type Workspace = Workspace;
 
@@ -351,19 +263,21 @@ impl Model for LoadedRod<'_> {
     }
 
     fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
-        Ok(self.run(work, |work, budget| {
-            self.begin(displacements, work);
-            self.sink(work)?;
-            self.climb(displacements, &[], work, budget)
-        }))
+        let wanted = self.lengths(displacements);
+        Ok(self.rise(&wanted, work))
     }
 
     fn resume(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
-        if work.ending != Ending::Converged || work.kept.bounds.len() != displacements.len() {
+        let Some(from @ Given::Lengths(_)) = work.kept.given.clone() else {
+            return self.solve(displacements, work);
+        };
+        if work.ending != Ending::Converged {
             return self.solve(displacements, work);
         }
-        let from = work.kept.bounds.clone();
-        let report = self.run(work, |work, budget| self.climb(displacements, &from, work, budget));
+        let wanted = self.lengths(displacements);
+        let report = self.run(work, |work, budget| {
+            self.climb(&wanted, Some(&from), work, budget, self.rod.stop.as_deref())
+        });
         let over = work.fault.is_some() || work.ending == Ending::Stopped;
         if report.status == Status::Converged || over {
             return Ok(report);
@@ -405,23 +319,5 @@ impl Model for LoadedRod<'_> {
             ));
         }
         parts.join("; ")
-    }
-}
-
-/// Compliances of contacts: shares of how far the rod gives way to a force across it at each disk.
-fn contact_gives(plan: &Plan, out: &mut Vec<f64>) {
-    out.clear();
-    // Sums of 1, s and s² over the stiffness, s the place of a subsegment.
-    let (mut s, mut sums) = (0.0, [0.0; 3]);
-    for i in 0..=plan.data.len() {
-        out.push(GIVE * (s * s * sums[0] - 2.0 * s * sums[1] + sums[2]));
-        if let Some(data) = plan.data.get(i) {
-            let (l, bends) = (plan.length(i), plan.settings.elements as f64 / data.stiffness[0]);
-            let middle = s + 0.5 * l;
-            for (sum, power) in sums.iter_mut().zip([1.0, middle, middle * middle]) {
-                *sum += power * bends;
-            }
-            s += l;
-        }
     }
 }

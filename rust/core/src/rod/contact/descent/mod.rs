@@ -1,11 +1,12 @@
 //! From a shape to the nearest minimum among the obstacles: Newton's method on the augmented Lagrangian.
 
+mod respond;
 mod search;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::field::Field;
-use super::merit::{Estimates, Held, Merit};
+use super::merit::{Drive, Estimates, Held, Merit};
 use super::scene::Scene;
 use super::sweep::{At, Sweep};
 use crate::obstacle::Fault;
@@ -47,7 +48,7 @@ pub(super) struct Surroundings<'a> {
     pub(super) scene: &'a Scene,
     /// Share of the loads.
     pub(super) share: f64,
-    pub(super) bounds: &'a [f64],
+    pub(super) drive: Drive<'a>,
     /// How far off parts of obstacles are looked at \[m\].
     pub(super) reach: f64,
     /// How far a point may go past another than through free space, in one step \[m\].
@@ -84,7 +85,7 @@ pub(super) struct Descent {
     pub(super) estimates: Estimates,
     sweep: Sweep,
     fields: Vec<Field>,
-    /// Tendons with a bound, those that pull and entries that push at the end of the step.
+    /// Tendons that matter, those of them that a bound makes pull and entries that push at the end of the step.
     bounded: Vec<bool>,
     pulling: Vec<bool>,
     active: Vec<bool>,
@@ -192,19 +193,27 @@ impl Descent {
     }
 
     fn evaluate_here(&mut self, around: &Surroundings<'_>) -> Result<(), Fault> {
-        let Surroundings { plan, scene, bounds, share, reach, .. } = *around;
-        self.here.evaluate(plan, scene, bounds, share, &self.estimates, reach)
+        let Surroundings { plan, scene, drive, share, reach, .. } = *around;
+        self.here.evaluate(plan, scene, drive, share, &self.estimates, reach)
     }
 
     /// Gradient and step with the conditions that are active here.
     fn look(&mut self, around: &Surroundings<'_>) {
         self.bounded.clear();
-        self.bounded.extend(around.bounds.iter().map(|bound| bound.is_finite()));
+        self.pulling.clear();
+        match around.drive {
+            Drive::Lengths(bounds) => {
+                self.bounded.extend(bounds.iter().map(|bound| bound.is_finite()));
+                self.pulling.extend(self.here.tensions.iter().map(|tension| *tension > 0.0));
+            }
+            Drive::Tensions(tensions) => {
+                self.bounded.resize(tensions.len(), true);
+                self.pulling.resize(tensions.len(), false);
+            }
+        }
         self.gives.clear();
         let own = self.estimates.tendon_give.iter().zip(&around.plan.compliance);
         self.gives.extend(own.map(|(give, own)| give + own));
-        self.pulling.clear();
-        self.pulling.extend(self.here.tensions.iter().map(|tension| *tension > 0.0));
         self.active.clear();
         self.active.extend(self.here.entries.iter().map(|entry| entry.force > 0.0));
         self.shifted = self.shift > 0.0;
@@ -218,14 +227,13 @@ impl Descent {
 
     /// Step downhill, with those conditions active that are so at its end.
     fn aim(&mut self, around: &Surroundings<'_>) {
-        let plan = around.plan;
         while self.sweep.unstable.is_some() && self.shift <= SHIFTS {
             self.shift = SHIFT.max(CHANGE * self.shift);
             self.sweep_once(around);
         }
         self.first.clone_from(&self.sweep.step);
         for _ in 0..SETS {
-            if !self.foresee(plan) {
+            if !self.foresee(around) {
                 return;
             }
             self.sweep_once(around);
@@ -240,8 +248,13 @@ impl Descent {
     fn sweep_once(&mut self, around: &Surroundings<'_>) {
         self.here.fields(around.scene, around.share, &self.active, &mut self.fields);
         self.tensions.clear();
-        let pulls = self.here.pulls.iter().zip(&self.pulling);
-        self.tensions.extend(pulls.map(|(pull, on)| if *on { *pull } else { 0.0 }));
+        match around.drive {
+            Drive::Lengths(_) => {
+                let pulls = self.here.pulls.iter().zip(&self.pulling);
+                self.tensions.extend(pulls.map(|(pull, on)| if *on { *pull } else { 0.0 }));
+            }
+            Drive::Tensions(tensions) => self.tensions.extend_from_slice(tensions),
+        }
         self.sweep.factor(&At {
             plan: around.plan,
             strains: &self.here.strains,
@@ -257,14 +270,17 @@ impl Descent {
     }
 
     /// Sets of conditions that push or pull at the end of the step, to first order; whether they are others.
-    fn foresee(&mut self, plan: &Plan) -> bool {
+    fn foresee(&mut self, around: &Surroundings<'_>) -> bool {
         let mut others = false;
         for (entry, active) in self.here.entries.iter().zip(&mut self.active) {
             let pushes = entry.push - entry.closing(&self.sweep.moved) / entry.give > 0.0;
             others |= pushes != *active;
             *active = pushes;
         }
-        self.sweep.lengthen(plan, &mut self.lengthened);
+        if matches!(around.drive, Drive::Tensions(_)) {
+            return others;
+        }
+        self.sweep.lengthen(around.plan, &mut self.lengthened);
         for (k, pulling) in self.pulling.iter_mut().enumerate() {
             let pulls =
                 self.bounded[k] && self.here.pulls[k] + self.lengthened[k] / self.gives[k] > 0.0;
@@ -278,8 +294,9 @@ impl Descent {
     fn left(&self, around: &Surroundings<'_>, nudged: usize) -> Left {
         let plan = around.plan;
         let mut length = 0.0_f64;
+        let held = matches!(around.drive, Drive::Lengths(_));
         for (k, tension) in self.here.tensions.iter().enumerate() {
-            if around.bounds[k].is_finite() {
+            if held && self.bounded[k] {
                 let over = self.here.over[k] - plan.compliance[k] * tension;
                 let off = if *tension > 0.0 { over.abs() } else { over.max(0.0) };
                 length = length.max(off / plan.rest_lengths[k]);
@@ -345,13 +362,13 @@ impl Descent {
         self.estimates.scale(self.estimates.stiffness);
         self.evaluate_here(around)?;
         let whole: f64 = self.escape.iter().map(|escape| escape.abs()).sum();
-        let Surroundings { plan, scene, bounds, share, reach, .. } = *around;
+        let Surroundings { plan, scene, drive, share, reach, .. } = *around;
         let mut size = NUDGE / whole;
         for _ in 0..HALVINGS {
             self.there.strains.clear();
             let moved = self.here.strains.iter().zip(&self.escape);
             self.there.strains.extend(moved.map(|(own, escape)| own + size * escape));
-            self.there.evaluate(plan, scene, bounds, share, &self.estimates, reach)?;
+            self.there.evaluate(plan, scene, drive, share, &self.estimates, reach)?;
             if self.passes(around)? {
                 break;
             }

@@ -81,8 +81,8 @@ impl Descent {
         self.there.strains.clear();
         let moved = self.here.strains.iter().zip(&self.sweep.step);
         self.there.strains.extend(moved.map(|(own, step)| own + share * step));
-        let Surroundings { plan, scene, bounds, share: loads, reach, .. } = *around;
-        self.there.evaluate(plan, scene, bounds, loads, &self.estimates, reach)?;
+        let Surroundings { plan, scene, drive, share: loads, reach, .. } = *around;
+        self.there.evaluate(plan, scene, drive, loads, &self.estimates, reach)?;
         let blind = -slope <= ROUNDING * self.here.size;
         let rounding = if blind { ROUNDING } else { 1e-2 * ROUNDING };
         let wanted = self.here.value

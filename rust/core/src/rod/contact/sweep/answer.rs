@@ -33,6 +33,37 @@ impl Sweep {
         self.go_out(plan, 0, true);
     }
 
+    /// The first-order change of the shape by a unit of a tendon's tension and of forces in the disks' potentials,
+    /// slopes of twists.
+    pub(in super::super) fn respond(
+        &mut self,
+        plan: &Plan,
+        moment: &Vector3<f64>,
+        tendon: usize,
+        slopes: &[Vector6<f64>],
+    ) {
+        let size = plan.width();
+        let mut beyond = Vector6::zeros();
+        for i in (0..plan.data.len()).rev() {
+            beyond += slopes[i + 1];
+            let range = i * size..(i + 1) * size;
+            let right = &mut self.right[range.clone()];
+            for (right, twist) in right.iter_mut().zip(&self.twists[range]) {
+                *right = twist.dot(&beyond);
+            }
+            for p in plan.starts[i]..plan.starts[i + 1] {
+                if plan.pieces[p].tendon == tendon {
+                    let row = &self.rows[p * size..(p + 1) * size];
+                    right.iter_mut().zip(row).for_each(|(right, slope)| *right += slope);
+                }
+            }
+        }
+        self.answer(plan);
+        if *moment != Vector3::zeros() {
+            self.turn(plan, moment);
+        }
+    }
+
     /// Changes the step by what a moment on the tip, which has no potential, adds to the derivatives of the slope:
     /// `½ m · (ω_a × ω_b)`, of rank two and antisymmetric.
     pub(super) fn turn(&mut self, plan: &Plan, moment: &Vector3<f64>) {

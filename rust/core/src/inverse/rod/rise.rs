@@ -1,0 +1,127 @@
+//! Whether the displacements of an answer lead to it from rest, where a robot has more than one shape.
+
+use crate::error::InvalidInput;
+use crate::inverse::bounds::Space;
+use crate::inverse::pull::Pull;
+use crate::inverse::search::{Effort, Found, Freedom, Search};
+use crate::lie::{Pose, so3};
+use crate::model::Model;
+use crate::obstacle::Fault;
+use crate::robot::Robot;
+use crate::rod::contact::{LoadedRod, Workspace};
+use crate::status::Status;
+
+/// The tool comes back to where it was to this share of the robot's length, and to this angle \[rad\].
+const SAME: f64 = 1e-8;
+/// So many answers that rest does not lead to, before one of them has to do.
+const TRIES: usize = 8;
+/// Places of an answer whatever its tensions, and of the first one that rest does not lead to.
+const MET: usize = 0;
+const FIRST: usize = 1;
+
+/// The forward model from rest.
+#[derive(Debug)]
+pub(super) struct Rise<'a> {
+    rod: LoadedRod<'a>,
+    robot: &'a Robot,
+    ranges: &'a [(f64, f64)],
+    work: Workspace,
+    /// Whether rest leads to the last answer.
+    leads: bool,
+}
+
+impl<'a> Rise<'a> {
+    pub(super) fn new(rod: &LoadedRod<'a>, robot: &'a Robot, ranges: &'a [(f64, f64)]) -> Self {
+        Self { rod: rod.clone(), robot, ranges, work: Workspace::default(), leads: true }
+    }
+
+    /// Searches on until rest leads to an answer, or for a few more answers; the first is kept otherwise.
+    pub(super) fn search(
+        &mut self,
+        pull: &mut Pull<'_>,
+        search: &mut Search<'_>,
+        space: &Space,
+        effort: Effort<'_>,
+        mut start: impl FnMut(usize, &mut Vec<f64>),
+    ) -> Found {
+        let mut first: Option<(Vec<f64>, Found)> = None;
+        let (mut iterations, mut starts) = (0, 0);
+        let mut meet = Effort { freedom: Freedom::None, ..effort };
+        self.leads = true;
+        for _ in 0..TRIES {
+            let found = search.run(pull, space, meet, &mut start);
+            (iterations, starts) = (iterations + found.iterations, starts + found.starts);
+            if found.status != Status::Converged {
+                if first.is_none() {
+                    return found;
+                }
+                break;
+            }
+            let point = search.point.clone();
+            pull.rod.keep(MET);
+            if effort.freedom != Freedom::None {
+                let lower = Effort { starts: 1, fall_back: false, nearest: false, ..effort };
+                let lower = search.run(pull, space, lower, |_, _| {});
+                iterations += lower.iterations;
+                if lower.status == Status::Converged && self.comes_to(pull).unwrap_or(false) {
+                    return Found { iterations, starts, ..found };
+                }
+                back(pull, search, MET, &point);
+            }
+            if self.comes_to(pull).unwrap_or(false) {
+                return Found { iterations, starts, ..found };
+            }
+            if first.is_none() {
+                pull.rod.keep(FIRST);
+                first = Some((point, found));
+            }
+            if found.starts >= meet.starts || search.stopped() {
+                break;
+            }
+            meet.first += found.starts;
+            meet.starts -= found.starts;
+            (meet.fall_back, meet.nearest) = (false, false);
+        }
+        let Some((point, found)) = first else { return search.run(pull, space, meet, start) };
+        self.leads = false;
+        back(pull, search, FIRST, &point);
+        Found { iterations, starts, ..found }
+    }
+
+    /// Whether the displacements at hand bring the tool to where it is.
+    fn comes_to(&mut self, pull: &Pull<'_>) -> Result<bool, InvalidInput> {
+        let own = self.ranges.iter().enumerate();
+        let displacements: Vec<f64> =
+            own.map(|(k, (low, high))| pull.rod.displacement(k).max(*low).min(*high)).collect();
+        let report = self.rod.solve(&displacements, &mut self.work)?;
+        let base = self.robot.base();
+        let tip = self.rod.state(&self.work).frames.last().copied();
+        let tool = tip.unwrap_or_else(Pose::identity).compose(self.robot.tool());
+        let wanted = base.compose(&pull.rod.motion().tool);
+        let off = (tool.translation - wanted.translation).norm();
+        let turned = so3::log(&tool.rotation.tr_mul(&wanted.rotation)).norm();
+        let near = SAME * self.robot.backbone().total_length();
+        Ok(report.status == Status::Converged && off <= near && turned <= SAME)
+    }
+
+    /// What there is to say of an answer that meets its target.
+    pub(super) fn message(&self) -> &'static str {
+        if self.leads {
+            return "";
+        }
+        "met on a way through other shapes: from rest the same displacements lead to another shape (start from answer.shape)"
+    }
+
+    pub(super) fn take_fault(&mut self) -> Option<Fault> {
+        self.work.take_fault()
+    }
+}
+
+/// Back to an answer that was kept, evaluated.
+fn back(pull: &mut Pull<'_>, search: &mut Search<'_>, place: usize, point: &[f64]) {
+    pull.forget();
+    pull.rod.go_back(place);
+    search.point.clear();
+    search.point.extend_from_slice(point);
+    search.fit.evaluate(pull, point);
+}

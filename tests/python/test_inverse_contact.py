@@ -1,0 +1,115 @@
+"""The inverse of the rod among obstacles and under loads; tensions among obstacles."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import tdcr
+from tdcr import Status
+
+STEEL = tdcr.Backbone(0.180, 18, youngs_modulus=200e9, diameter=0.001)
+ROBOT = tdcr.Robot(STEEL, [tdcr.Tendon(2 * np.pi * k / 3, 0.008) for k in range(3)])
+BAR = tdcr.Cylinder(point=(-0.030, 0, 0.100), axis=(0, 1, 0), radius=0.015)
+FINGER = tdcr.Robot(STEEL, [tdcr.Tendon(np.pi, 0.008)])
+
+
+def tips(robot, count, **around):
+    """Return tips of shapes that lean on something."""
+    rng = np.random.default_rng(3)
+    found = []
+    while len(found) < count:
+        pulls = rng.uniform(0, 6, len(robot.tendons))
+        pulls[rng.integers(len(pulls))] = 0
+        shape = tdcr.forward(robot, tensions=pulls, **around)
+        if shape.ok and any(np.linalg.norm(c.force) > 0 for c in shape.contacts):
+            found.append(shape.tip)
+    return np.array(found)
+
+
+def test_a_trunk_leans_on_a_cylinder_to_reach_its_target():
+    target = tdcr.forward(FINGER, [-0.008], obstacles=BAR).require().positions[-1]
+    # Without the bar a single tendon bends the trunk elsewhere.
+    assert tdcr.inverse(FINGER, target).status is Status.unreachable
+    answer = tdcr.inverse(FINGER, target, obstacles=BAR)
+    assert answer.ok
+    assert answer.message == ""
+    np.testing.assert_allclose(answer.displacements, [-0.008], rtol=0, atol=1e-9)
+    shape = tdcr.forward(FINGER, answer.displacements, obstacles=BAR).require()
+    np.testing.assert_allclose(shape.positions[-1], target, rtol=0, atol=1e-8)
+    assert np.linalg.norm(shape.contacts[0].force) > 0.1
+    np.testing.assert_allclose(answer.shape.positions, shape.positions, rtol=0, atol=1e-8)
+    assert answer.shape.obstacles == (BAR,)
+
+
+def test_weight_and_obstacles_are_counted():
+    around = {"obstacles": BAR, "loads": tdcr.Loads(backbone_density=7850, disk_mass=0.001)}
+    for tip in tips(ROBOT, 5, **around):
+        answer = tdcr.inverse(ROBOT, tip[:3, 3], **around).require()
+        shape = tdcr.forward(ROBOT, answer.displacements, **around)
+        np.testing.assert_allclose(shape.positions[-1], tip[:3, 3], rtol=0, atol=1e-8)
+        assert (answer.tensions >= 0).all()
+        assert min((c.gap for c in answer.shape.contacts), default=0) > -1e-10
+
+
+def test_rows_and_paths_are_those_of_single_targets():
+    targets = tips(ROBOT, 6, obstacles=BAR)[:, :3, 3]
+    rows = tdcr.inverse_batch(ROBOT, targets, obstacles=[BAR], threads=2)
+    assert rows.ok.all()
+    alone = [tdcr.inverse(ROBOT, target, obstacles=[BAR]) for target in targets]
+    np.testing.assert_array_equal(rows.displacements, [one.displacements for one in alone])
+    np.testing.assert_allclose(rows[2].shape.positions[-1], targets[2], rtol=0, atol=1e-8)
+    assert pickle.loads(pickle.dumps(rows)) == rows
+    pulls = np.linspace(-0.004, -0.010, 60)[:, None]
+    way = tdcr.forward_batch(FINGER, pulls, obstacles=BAR, warm=True, fields=["positions"])
+    path = tdcr.track(FINGER, way.positions[:, -1], start=pulls[0], obstacles=BAR)
+    assert path.ok.all()
+    assert (path.starts == 1).all()
+    np.testing.assert_allclose(path.displacements, pulls, rtol=0, atol=1e-8)
+
+
+def test_out_of_reach_is_told():
+    search = tdcr.InverseSettings(starts=4)
+    answer = tdcr.inverse(ROBOT, [-0.03, 0, 0.1], obstacles=BAR, search=search)
+    assert answer.status is Status.unreachable
+    assert "m off the target" in answer.message
+    assert answer.error > 1e-3
+    assert min((c.gap for c in answer.shape.contacts), default=0) > -1e-9
+
+
+def test_tensions_among_obstacles_and_under_loads():
+    loads = tdcr.Loads(disk_mass=0.001)
+    shape = tdcr.forward(ROBOT, tensions=[0, 5, 4], obstacles=BAR, loads=loads).require()
+    np.testing.assert_array_equal(shape.tensions, [0, 5, 4])
+    assert shape.contacts
+    again = tdcr.forward(ROBOT, shape.displacements, obstacles=BAR, loads=loads)
+    np.testing.assert_allclose(again.positions, shape.positions, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(again.contacts[0].force, shape.contacts[0].force, rtol=1e-6)
+    with pytest.raises(tdcr.InvalidInput, match="tensions: expected finite tensions of 0 or more"):
+        tdcr.forward(ROBOT, tensions=[0, 5, -4], obstacles=BAR)
+
+
+def test_bad_input_is_named():
+    target = [0, 0.05, 0.15]
+    with pytest.raises(tdcr.InvalidInput, match='obstacles for model "constant_curvature"'):
+        tdcr.inverse(ROBOT, target, model="constant_curvature", obstacles=BAR)
+    with pytest.raises(TypeError, match="obstacles: expected"):
+        tdcr.inverse(ROBOT, target, obstacles=3)
+    with pytest.raises(TypeError, match="loads: expected Loads"):
+        tdcr.inverse_batch(ROBOT, [target], loads=3)
+    soft = tdcr.Robot(tdcr.Backbone(0.1, 10), [tdcr.Tendon(0.0, 0.008)])
+    with pytest.raises(tdcr.InvalidInput, match="youngs_modulus"):
+        tdcr.inverse(soft, target, loads=tdcr.Loads())
+
+
+@pytest.mark.parametrize("call", [tdcr.inverse, tdcr.inverse_batch, tdcr.track])
+def test_what_a_function_raises_comes_out(call):
+    def broken(point):
+        if point[2] < 0.17:
+            raise ZeroDivisionError("no distance here")
+        return 1.0
+
+    target = [0.05, 0.0, 0.15] if call is tdcr.inverse else [[0.05, 0.0, 0.15]] * 3
+    gradient = lambda point: (0.0, 0.0, 1.0)  # noqa: E731
+    with pytest.raises(ZeroDivisionError, match="no distance here"):
+        call(ROBOT, target, obstacles=tdcr.SignedDistance(broken, gradient))
