@@ -11,21 +11,22 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tdcr._canvas import Flat, Scene, Solid, Unit, draw, draw_forces
+from tdcr._canvas import Flat, Scene, Solid, Unit, draw, draw_forces, draw_marks
 from tdcr._view import Plane, plane_of
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
     from tdcr._core import Shape
 
-__all__ = ["one_of", "plot_shape", "require_matplotlib", "save_picture"]
+__all__ = ["FAILED", "check_picture", "one_of", "plot_shape", "require_matplotlib", "save_picture"]
 
 View = Literal["auto", "2d", "3d"]
 
-_FAILED = "#B3261E"
+FAILED = "#B3261E"
 
 
 def plot_shape(
@@ -37,6 +38,7 @@ def plot_shape(
     tendons: bool = True,
     obstacles: bool = True,
     contacts: bool = True,
+    marks: ArrayLike | None = None,
     legend: bool = True,
     title: str | None = None,
     unit: Unit = "auto",
@@ -62,6 +64,8 @@ def plot_shape(
         length away (not those of a `SignedDistance`).
     contacts : bool
         Draw the contact forces as arrows, the largest a quarter of the robot's length.
+    marks : array_like, shape (m, 3)
+        Places to mark, in their order: a target, a path [m].
     legend : bool
         Name the tendons and how far each is pulled or released.
     title : str, optional
@@ -97,6 +101,8 @@ def plot_shape(
     draw(canvas, scene, disks, tendons)
     if contacts:
         draw_forces(canvas, scene)
+    if marks is not None:
+        draw_marks(canvas, scene, marks)
     canvas.finish()
     _label(ax, scene, title, legend and tendons)
     return ax
@@ -207,14 +213,14 @@ def _label(ax: Any, scene: Scene, title: str | None, legend: bool) -> None:
         title = f"{title}\n{textwrap.fill(text, 80)}".lstrip("\n")
     if title:
         # Names and messages are text, not formulas: a "$" in them is a "$".
-        ax.set_title(title, fontsize=10, color="black" if shape.ok else _FAILED, parse_math=False)
+        ax.set_title(title, fontsize=10, color="black" if shape.ok else FAILED, parse_math=False)
     if legend and shape.robot.tendons:
         count = len(shape.robot.tendons)
         entries = ax.legend(
             fontsize=8,
             frameon=False,
             loc="upper center",
-            bbox_to_anchor=(0.5, -0.12 if ax.name != "3d" else 0.0),
+            bbox_to_anchor=(0.5, -0.12),
             ncols=min(count, 4 if count != 6 else 3),
             title="tendons",
             title_fontsize=8,

@@ -352,6 +352,8 @@ impl Shape {
     ///     "auto" is the plane of the bend where the shape stays in one.
     /// disks, tendons, obstacles, contacts, legend : bool, optional
     ///     What is drawn.
+    /// marks : array_like, shape (m, 3), optional
+    ///     Places to mark, in their order: a target, a path [m].
     /// title : str, optional
     ///     Default: name of the robot, model and status.
     /// unit : {"auto", "m", "mm"}, optional
