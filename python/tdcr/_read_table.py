@@ -183,11 +183,11 @@ def numbered_points(table: Table, argument: str) -> list[int]:
     else:
         known = ", ".join(map(repr, table.names))
         got = "none" if not whole else "those of " + ", ".join(repr(" ".join(n)) for n in whole)
-        raise table.fault(
-            argument,
-            f"{argument}: expected columns x, y and z of one point, or of points with numbers, got "
-            f"{got} among {known}; name them",
-        )
+        expected = "expected columns x, y and z of one point"
+        if argument == "positions":
+            expected = f"positions: {expected}, or of points with numbers"
+            known += "; name them"
+        raise table.fault(argument, f"{expected}, got {got} among {known}")
     return [whole[name][axis] for name in names for axis in _AXES]
 
 

@@ -237,6 +237,8 @@ def print_design(found: Prebend | Routing, unit: str) -> None:
     if holes is not None:
         console.print()
         table = table_of(console, "tendon", "holes of disks 0 to its end")
+        # Long lists go on in the next line.
+        table.columns[1].no_wrap, table.columns[1].justify = False, "left"
         for name, own in zip(found.robot.tendon_names, holes, strict=True):
             table.add_row(text_of(name), " ".join(map(str, own)))
         console.print(table)

@@ -51,6 +51,8 @@ def _shape_read(record: Record) -> Any:
     rows = record.sizes["n"] * getattr(settings, "elements", 1)
     wide = bool(np.shape(record.array("strains", rows, -1))[1] == 4)
     frames = record.array("frames", "n+1", 4, 4)
+    if not np.array_equal(frames[:, 3], np.tile([0.0, 0.0, 0.0, 1.0], (len(frames), 1))):
+        raise record.fault("frames", "expected homogeneous matrices, with last rows 0 0 0 1")
     contacts = record.things("contacts", ("Contact",))
     obstacles = record.things("obstacles")
     ends = [tendon.end or record.sizes["n"] for tendon in robot.tendons]

@@ -419,7 +419,10 @@ BAD = [
     (["inverse", "--position", "nan", "2", "3"], "target: expected a finite position [m], got NaN"),
     (["inverse", "--position", "1", "2", "3", "--model", "linkage"], "model: expected"),
     (["track", "none.csv"], "none.csv: No such file"),
-    (["track", "p.txt", "--unit", "m"], "p.txt: path: expected columns x, y and z of one point"),
+    (
+        ["track", "p.txt", "--unit", "m"],
+        "p.txt: expected columns x, y and z of one point, got none",
+    ),
     (["workspace", "--ranges", "1:2:3"], "expected LOW:HIGH, a number or free, got '1:2:3'"),
     (["workspace", "--ranges", ""], "got nothing"),
     (["workspace", "--ranges", "free"], "expected a tendon that is not free"),
@@ -438,6 +441,25 @@ def test_bad_input_is_one_line(arguments, text, robot, tmp_path, capsys):
     command, *rest = arguments
     _, err = run(capsys, command, robot, *rest, code=2)
     assert text in err
+
+
+@pytest.mark.parametrize("option", ["--output", "--plot", "--json"])
+def test_files_that_cannot_be_written_are_refused_before_the_solve(
+    option, robot, tmp_path, capsys, monkeypatch
+):
+    def solve(*arguments, **options):
+        raise AssertionError("solved")
+
+    monkeypatch.setattr(tdcr, "workspace", solve)
+    (tmp_path / "folder.npz").mkdir()
+    for path, text in (
+        ("none/w.npz", "No such file or directory"),
+        ("folder.npz", "Is a directory"),
+        (f"{robot}/w.npz", "Not a directory"),
+    ):
+        command = ["workspace", robot, "--ranges", "-0.001:0", option, path]
+        _, err = run(capsys, *command, code=2)
+        assert err == f"tdcr: error: {path}: {text}\n"
 
 
 @pytest.mark.parametrize(

@@ -237,6 +237,7 @@ def saved(tmp_path):
         ({"frames": [[1.0]]}, r"frames: expected shape \(11, 4, 4\), got \(1, 1\)"),
         ({"frames": [[1.0], [1.0, 2.0]]}, "frames: expected a rectangular array"),
         ({"frames": "none"}, "frames: expected an array, got 'none'"),
+        ({"frames": [[[1.0] * 4] * 4] * 11}, "frames: expected homogeneous matrices"),
         ({"tensions": ["x"]}, "tensions: expected numbers, got 'x'"),
         ({"tensions": [True]}, "tensions: expected numbers, got True"),
         ({"tensions": [1.0, 2.0]}, r"tensions: expected shape \(1\), got \(2,\)"),

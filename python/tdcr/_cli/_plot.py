@@ -22,8 +22,19 @@ __all__ = ["plot"]
     '  tdcr plot trunk.toml --pull "-20 free free" --unit mm --animate pull.gif',
 )
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("-o", "--output", metavar="FILE", help="The picture: .png, .pdf, .svg, ...")
-@click.option("--animate", metavar="FILE", help="Of a robot: a GIF of the pull, from rest.")
+@click.option(
+    "-o",
+    "--output",
+    callback=own.writable,
+    metavar="FILE",
+    help="The picture: .png, .pdf, .svg, ...",
+)
+@click.option(
+    "--animate",
+    callback=own.writable,
+    metavar="FILE",
+    help="Of a robot: a GIF of the pull, from rest.",
+)
 @own.displacements_option(required=False)
 @own.model_option("rod", "linkage", "constant_curvature")
 @own.unit_option("the displacements")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable, Iterable
@@ -36,6 +37,7 @@ __all__ = [
     "said",
     "target_option",
     "unit_option",
+    "writable",
     "written",
 ]
 
@@ -111,11 +113,30 @@ def target_option(command: Command) -> Command:
     )(command)
 
 
+def writable(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
+    """Refuse a file that cannot be written before a long solve, not after it."""
+    if path in (None, "-"):
+        return path
+    folder, fault = Path(str(path)).parent, 0
+    if Path(str(path)).is_dir():
+        fault = errno.EISDIR
+    elif not folder.exists():
+        fault = errno.ENOENT
+    elif not folder.is_dir():
+        fault = errno.ENOTDIR
+    elif not os.access(folder, os.W_OK):
+        fault = errno.EACCES
+    if fault:
+        raise OSError(fault, os.strerror(fault), str(path))
+    return path
+
+
 def json_option(command: Command) -> Command:
     """Option for JSON, on stdout or into a file."""
     return click.option(
         "--json",
         "json_file",
+        callback=writable,
         is_flag=False,
         flag_value="-",
         metavar="[FILE]",
@@ -127,7 +148,11 @@ def json_option(command: Command) -> Command:
 def picture_option(command: Command) -> Command:
     """Option for a picture."""
     return click.option(
-        "--plot", "plot_file", metavar="FILE", help="Write a picture: .png, .pdf, .svg, ..."
+        "--plot",
+        "plot_file",
+        callback=writable,
+        metavar="FILE",
+        help="Write a picture: .png, .pdf, .svg, ...",
     )(command)
 
 
@@ -135,6 +160,7 @@ def output_option(what: str, *endings: str) -> Callable[[Command], Command]:
     """Option for the file of a result, whose ending is checked before anything is solved."""
 
     def check(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
+        writable(context, parameter, path)
         if path is not None and os.path.splitext(path)[1].lower() not in endings:
             *first, last = endings
             expected = f"{', '.join(first)} or {last}" if first else last
