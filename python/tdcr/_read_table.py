@@ -86,18 +86,17 @@ class Table:
         return values
 
     def _cell(self, text: str, line: int, column: int, unit: str, free: bool) -> float:
-        if text.lower() in ("", "nan"):
+        if re.fullmatch(r"([+-]?nan)?", text.lower()):
             return math.nan
         if free and text.lower() in ("free", "inf", "+inf"):
             return math.inf
-        try:
-            number = float(text)
-        except ValueError:
-            number = math.inf
+        # Python reads 1_000 too, which no instrument writes.
+        number = float(text) if _is_number(text) and "_" not in text else math.inf
         if not math.isfinite(number):
             what = "a number, inf or free" if free else "a number"
             where = f"line {line}, column {self.names[column]!r}"
-            raise self.fault("path", f"{where}: expected {what} [{unit}], got {text[:40]!r}")
+            hint = "; decimals have a point" if re.fullmatch(r"[+-]?\d*,\d+", text) else ""
+            raise self.fault("path", f"{where}: expected {what} [{unit}], got {text[:40]!r}{hint}")
         return float(Decimal(text) * _METRES[unit])
 
     @staticmethod
@@ -151,6 +150,10 @@ def read_table(path: StrPath) -> Table:
     twice = [name for name in names if names.count(name) > 1 and name]
     if twice:
         raise table.fault("path", f"expected columns of different names, got {twice[0]!r} twice")
+    for row, line in zip(table.cells, table.lines, strict=True):
+        if any(cell.strip() for cell in row[len(names) :]):
+            expected = f"expected {len(names)} cells, as many as names of columns"
+            raise table.fault("path", f"line {line}: {expected}, got {len(row)}")
     if not table.cells:
         raise table.fault("path", "expected rows below the names of columns, got none")
     return table

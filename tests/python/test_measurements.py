@@ -20,7 +20,7 @@ time,d_left_mm,d_right_mm,tip_x_mm,tip_y_mm,tip_z_mm
 0.1,10.001,free,2,3,4
 0.2,,1,2,3,4
 
-0.3,1,2,nan,3,4
+0.3,1,2,-nan,3,4
 0.4,-9.9,-10,5,6,7
 
 """
@@ -165,6 +165,9 @@ WRONG = {
     b"d1,x,y,z\n1,2,3,4\n1,2,three,4\n": "line 3, column 'y': expected a number [mm], got 'three'",
     b"d1,x,y,z\n1,2,3,1e999\n": "column 'z': expected a number [mm], got '1e999'",
     b"d1,x,y,z\n-inf,2,3,4\n": "column 'd1': expected a number, inf or free [mm], got '-inf'",
+    b"d1;x;y;z\n1,5;2;3;4\n": "got '1,5'; decimals have a point",
+    b"d1,x,y,z\n1_0,2,3,4\n": "expected a number, inf or free [mm], got '1_0'",
+    b"d1,x,y,z\n1,2,3,4,\n1,2,3,4,5\n": "line 3: expected 4 cells, as many as names of columns",
     b"d1,x,y,z\n,2,3,4\n1,2\n": "expected a row without gaps, got none in 2",
 }
 
