@@ -79,6 +79,7 @@ def animate_pull(
         matplotlib is not installed.
     """
     check_gif(path)
+    from matplotlib import rc_context
     from matplotlib.animation import PillowWriter
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -87,17 +88,19 @@ def animate_pull(
     figure = Figure(figsize=_SIZE)
     FigureCanvasAgg(figure)
     writer = PillowWriter(fps=_FPS)
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder, rc_context({"savefig.bbox": None}):
         whole = Path(folder) / "pull.gif"
-        with writer.saving(figure, str(whole), dpi=_DPI):
-            for step in range(len(shapes)):
-                figure.clear()
-                _frame(figure, shapes, step)
-                writer.grab_frame()
-                if progress is not None:
-                    progress(step + 1)
-            for _ in range(_HELD):
-                writer.grab_frame()
+        # Not `writer.saving`: interrupted, it would write what there is, and fail over nothing.
+        writer.setup(figure, str(whole), dpi=_DPI)
+        for step in range(len(shapes)):
+            figure.clear()
+            _frame(figure, shapes, step)
+            writer.grab_frame()
+            if progress is not None:
+                progress(step + 1)
+        for _ in range(_HELD):
+            writer.grab_frame()
+        writer.finish()
         replace_file(path, lambda stream: stream.write(whole.read_bytes()))
 
 

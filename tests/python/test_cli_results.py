@@ -514,6 +514,30 @@ def test_interrupting_ends_with_130_and_one_line(command, robot, tmp_path):
     assert set(tmp_path.iterdir()) == before
 
 
+@pytest.mark.parametrize("done", [0, 3])
+def test_an_animation_that_is_interrupted_is_not_written(
+    done, robot, tmp_path, capsys, monkeypatch
+):
+    """Before the first frame too, when there is nothing to write."""
+    pytest.importorskip("matplotlib")
+    from tdcr import _animate
+
+    drawn = []
+
+    def frame(figure, shapes, step):
+        if len(drawn) == done:
+            raise KeyboardInterrupt
+        drawn.append(step)
+
+    monkeypatch.setattr(_animate, "_frame", frame)
+    before = set(tmp_path.iterdir())
+    command = ["plot", robot, "--pull", "-0.01 free free", "--animate", "p.gif"]
+    assert main(command) == 130
+    assert capsys.readouterr().err == "tdcr: interrupted\n"
+    assert drawn == list(range(done))
+    assert set(tmp_path.iterdir()) == before
+
+
 def test_progress_is_drawn_on_a_terminal_alone(robot, tmp_path):
     pty = pytest.importorskip("pty")
     import os
