@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tdcr._core import Robot
     from tdcr._fit import Fit
     from tdcr._inverse_results import Inverse, InverseBatch
+    from tdcr._measurements import Measurements
     from tdcr._routing import Routing
     from tdcr._workspace_results import Workspace
     from tdcr.design import Prebend
@@ -269,7 +270,7 @@ def fit_json(found: Fit) -> str:
     return header_text("Fit", {name: described(value, name) for name, value in own.items()})
 
 
-def print_fit(found: Fit, dropped: int, unit: str) -> None:
+def print_fit(found: Fit, measured: Measurements, unit: str) -> None:
     """Print a fit: distances before and after, and the parameters in SI."""
     console = console_of()
     held = int(found.validation.sum())
@@ -277,7 +278,10 @@ def print_fit(found: Fit, dropped: int, unit: str) -> None:
         _name(found.robot),
         ("status", str(found.status)),
         ("iterations", str(found.iterations)),
-        ("rows", f"{len(found.rows)}, {held} of them held out; {dropped} dropped for gaps"),
+        (
+            "rows",
+            f"{len(found.rows)}, {held} of them held out; {measured.dropped} dropped for gaps",
+        ),
     ]
     for part in _parts(found):
         name = "held-out rows" if part == "validation" else "fitted rows"
@@ -285,6 +289,13 @@ def print_fit(found: Fit, dropped: int, unit: str) -> None:
         before, after = (_length(value, unit) for value in pair)
         facts.append((f"root mean square distance, {name} [{unit}]", f"{before} -> {after}"))
     console.print(facts_table(console, *facts))
+    console.print()
+    # Columns are found by their order: a person sees whether it is that of the tendons.
+    table = table_of(console, "tendon", "displacements in column")
+    table.columns[1].justify = "left"
+    for name, column in zip(found.robot.tendon_names, measured.displacement_columns, strict=True):
+        table.add_row(text_of(name), text_of(column))
+    console.print(table)
     console.print()
     table = table_of(console, "parameter", "value", "standard error")
     for name, values in found.parameters.items():

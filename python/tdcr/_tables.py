@@ -16,7 +16,7 @@ from tdcr._objects import described
 from tdcr._replace import replace_file
 from tdcr.errors import InvalidInput
 
-__all__ = ["read_parquet", "write_csv", "write_parquet"]
+__all__ = ["read_parquet", "require_pyarrow", "write_csv", "write_parquet"]
 
 StrPath: TypeAlias = str | os.PathLike[str]
 Columns: TypeAlias = dict[str, Any]
@@ -98,7 +98,8 @@ def write_csv(path: StrPath, result: Any) -> None:
     replace_file(path, lambda stream: stream.write(text.getvalue().encode()))
 
 
-def _pyarrow() -> Any:
+def require_pyarrow() -> Any:
+    """Import pyarrow, or say how to get it."""
     try:
         import pyarrow  # type: ignore[import-untyped, import-not-found, unused-ignore]
         import pyarrow.parquet  # type: ignore[import-untyped, import-not-found, unused-ignore]
@@ -115,7 +116,7 @@ def write_parquet(path: StrPath, result: Any) -> None:
         kind = type(result).__name__
         message = f"path: expected no .parquet for {kind}, which is no table of rows"
         raise InvalidInput(f"{message}, got {os.fspath(path)!r}", "path")
-    arrow = _pyarrow()
+    arrow = require_pyarrow()
     columns = {name: arrow.array(column) for name, column in columns_of(result).items()}
     metadata = {}
     if type(result).__name__ == "Workspace":
@@ -139,7 +140,7 @@ def _fields(workspace: Any) -> list[str]:
 def read_parquet(path: StrPath) -> dict[str, Any]:
     """Read the fields of a workspace from the Parquet file that it wrote."""
     shown = os.fspath(path)
-    arrow = _pyarrow()
+    arrow = require_pyarrow()
     with open(path, "rb") as stream:
         try:
             table = arrow.parquet.read_table(stream)

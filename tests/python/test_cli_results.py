@@ -205,6 +205,18 @@ def test_workspace_tells_reach_and_saves_samples(robot, tmp_path, capsys):
     picture(tmp_path / "w3.png")
 
 
+def test_parquet_is_asked_for_before_the_solve(robot, tmp_path, capsys, monkeypatch):
+    command = ["workspace", robot, *WORKSPACE, "--output", "w.parquet"]
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "pyarrow", None)
+        out, err = run(capsys, *command, code=2)
+    assert out == ""
+    assert "pip install tdcr[parquet]" in err
+    pytest.importorskip("pyarrow")
+    run(capsys, *command)
+    assert len(tdcr.Workspace.load("w.parquet")) == 50
+
+
 def test_a_workspace_of_which_nothing_converges(robot, capsys):
     command = ["workspace", robot, "--ranges", "-0.02:-0.01", "--samples", "8"]
     out, err = run(capsys, *command, "--sampling", "random", code=1)
@@ -286,6 +298,7 @@ def test_fit_prints_parameters_and_writes_the_robot(measured, tmp_path, capsys):
     table = facts(out)
     assert table["rows"] == ["40, 8 of them held out; 1 dropped for gaps"]
     assert float(table["gain left"][0]) == pytest.approx(1.1, abs=1e-5)
+    assert table["left"] == ["d_left"]
     picture(tmp_path / "fit.png")
     fitted = tdcr.Robot.load("fitted.toml")
     found = tdcr.read_measurements("m.csv", unit="mm", pull_sign="positive")
@@ -301,6 +314,15 @@ def test_fit_names_columns(measured, capsys):
     columns += ["--position-columns", "tip_x,tip_y,tip_z", "--parameters", "gain"]
     out, _ = run(capsys, *measured, *columns, "--model", "constant_curvature")
     assert "gain front" in out
+
+
+def test_fit_wants_a_column_for_every_tendon(measured, capsys):
+    columns = ["--displacement-columns", "d_front,d_left", "--parameters", "gain"]
+    _, err = run(capsys, *measured, *columns, code=2)
+    expected = (
+        "m.csv: expected a column of displacements for each of the tendons front, left, right"
+    )
+    assert f"{expected}, got d_front, d_left" in err
 
 
 @pytest.mark.parametrize("missing", ["--unit", "--pull-sign"])

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from tdcr import Robot, read_measurements
+from tdcr import InvalidInput, Robot, read_measurements
 from tdcr._cli import _shared as own
 
 __all__ = ["fit"]
@@ -101,6 +101,14 @@ def fit(
         positions=options["position_columns"],
         free_from=options["free_from"],
     )
+    columns = measured.displacement_columns
+    if len(columns) != len(arm.tendons):
+        names = ", ".join(arm.tendon_names)
+        raise InvalidInput(
+            f"{measurements}: expected a column of displacements for each of the tendons {names}, "
+            f"got {', '.join(columns)}; name them with --displacement-columns",
+            "displacements",
+        )
     found = solve(
         arm,
         measured,
@@ -113,7 +121,7 @@ def fit(
     own.printed(
         json_file,
         lambda: report.fit_json(found),
-        lambda: report.print_fit(found, measured.dropped, shown),
+        lambda: report.print_fit(found, measured, shown),
     )
     own.written(output, found.robot.save)
     if plot_file is not None:

@@ -165,6 +165,10 @@ def output_option(what: str, *endings: str) -> Callable[[Command], Command]:
             *first, last = endings
             expected = f"{', '.join(first)} or {last}" if first else last
             raise click.BadParameter(f"expected a file ending in {expected}, got {path!r}")
+        if path is not None and path.lower().endswith(".parquet"):
+            from tdcr._tables import require_pyarrow
+
+            require_pyarrow()
         return path
 
     return click.option(
