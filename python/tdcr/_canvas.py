@@ -21,7 +21,7 @@ from tdcr.errors import InvalidInput
 if TYPE_CHECKING:
     from tdcr._core import Shape
 
-__all__ = ["Flat", "Scene", "Solid", "draw", "draw_forces", "draw_marks"]
+__all__ = ["Flat", "Scene", "Solid", "draw", "draw_forces", "draw_marks", "places_of"]
 
 Unit = Literal["auto", "m", "mm"]
 Points = NDArray[np.float64]
@@ -303,12 +303,17 @@ def draw_forces(canvas: Flat | Solid, scene: Scene, largest: float | None = None
         canvas.arrow(contact.point * scene.scale, force * unit)
 
 
-def draw_marks(canvas: Flat | Solid, scene: Scene, marks: Any) -> None:
-    """Draw a cross at a single place, a line through several, with dots where they lie apart."""
+def places_of(marks: Any) -> Points:
+    """Check places to mark."""
     places = numbers("marks", marks)
     if places.ndim != 2 or places.shape[1] != 3:
         message = f"marks: expected places of shape (m, 3), got shape {places.shape}"
         raise InvalidInput(message, "marks")
+    return places
+
+
+def draw_marks(canvas: Flat | Solid, scene: Scene, places: Points) -> None:
+    """Draw a cross at a single place, a line through several, with dots where they lie apart."""
     style: dict[str, Any] = {"linewidth": 0.8}
     if len(places) == 1:
         style = {"marker": "x", "markersize": 8.0, "markeredgewidth": 2.0}

@@ -219,20 +219,11 @@ def printed(json_file: str | None, text: Callable[[], str], table: Callable[[], 
 
 
 def picture(shape: Shape, path: str | None, marks: NDArray[Any] | None = None) -> None:
-    """Write the picture of a shape, with places marked that may lie outside of its plane."""
-    if path is None:
-        return
-    import numpy as np
+    """Write the picture of a shape, with places marked."""
+    if path is not None:
+        from tdcr._plot import save_picture
 
-    from tdcr._plot import save_picture
-    from tdcr._view import plane_of
-
-    view = "auto"
-    if marks is not None:
-        off = (marks - shape.robot.base[:3, 3]) @ plane_of(shape).normal
-        if np.abs(off).max() > 1e-6 * shape.robot.backbone.total_length:
-            view = "3d"
-    save_picture(shape, path, view=view, marks=marks)
+        save_picture(shape, path, marks=marks)
 
 
 def said(ok: bool, name: str | None, status: str, message: str) -> int:
