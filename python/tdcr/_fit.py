@@ -200,14 +200,7 @@ def fit(
     if max_iterations < 1:
         message = f"max_iterations: expected at least 1, got {max_iterations}"
         raise InvalidInput(message, "max_iterations")
-    if isinstance(measurements, Measurements):
-        if displacements is not None:
-            message = "displacements: expected none with Measurements, which have their own"
-            raise InvalidInput(message, "displacements")
-        own = measurements
-        measurements, displacements = own.positions, own.displacements
-    elif displacements is None:
-        raise TypeError("displacements: expected an array, or Measurements as measurements")
+    displacements, measurements = _paired(displacements, measurements)
     problem, measured = _checked(
         robot, displacements, measurements, parameters, model, settings, validation
     )
@@ -253,6 +246,20 @@ def fit(
         iterations=iterations,
         seed=seed,
     )
+
+
+def _paired(
+    displacements: ArrayLike | None, measurements: ArrayLike | Measurements
+) -> tuple[ArrayLike, ArrayLike]:
+    """Give displacements and positions, of which measurements have both."""
+    if isinstance(measurements, Measurements):
+        if displacements is not None:
+            message = "displacements: expected none with Measurements, which have their own"
+            raise InvalidInput(message, "displacements")
+        return measurements.displacements, measurements.positions
+    if displacements is None:
+        raise TypeError("displacements: expected an array, or Measurements as measurements")
+    return displacements, measurements
 
 
 def _checked(

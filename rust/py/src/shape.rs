@@ -509,12 +509,17 @@ pub(crate) fn _shape(
     let core = tdcr::Shape { state, report: Report { status, residual, iterations }, message };
     let choice = Choice::new(model, Some(settings))?;
     let displacements = list("displacements", displacements)?;
-    let (disks, tendons) =
-        (robot.get().0.backbone().subsegments() + 1, robot.get().0.paths().len());
+    fits(&robot.get().0, &core.state, &displacements)?;
+    Ok(Shape::new(robot.get().clone(), choice, displacements, core).among(around))
+}
+
+/// Refuses a state that is not one of the robot: its tendons' holes are looked up by disk.
+fn fits(robot: &tdcr::robot::Robot, state: &State, displacements: &[f64]) -> PyResult<()> {
+    let (disks, tendons) = (robot.backbone().subsegments() + 1, robot.paths().len());
     for (name, expected, got) in [
-        ("frames", disks, core.state.frames.len()),
-        ("tendon_lengths", tendons, core.state.tendon_lengths.len()),
-        ("tensions", tendons, core.state.tensions.len()),
+        ("frames", disks, state.frames.len()),
+        ("tendon_lengths", tendons, state.tendon_lengths.len()),
+        ("tensions", tendons, state.tensions.len()),
         ("displacements", tendons, displacements.len()),
     ] {
         if got != expected {
@@ -522,5 +527,5 @@ pub(crate) fn _shape(
             return Err(crate::convert::wrong_shape(name, &wanted, &[got]));
         }
     }
-    Ok(Shape::new(robot.get().clone(), choice, displacements, core).among(around))
+    Ok(())
 }
