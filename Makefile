@@ -43,7 +43,7 @@ $(VENV)/created: | tools
 
 $(VENV)/installed: $(VENV)/created $(SOURCES) | tools
 	$(BIN)/pip install --quiet --force-reinstall --no-deps .
-	$(BIN)/pip install --quiet '.[plot,mesh,sobol]'
+	$(BIN)/pip install --quiet '.[plot,mesh,sobol,parquet]'
 	@touch $@
 
 $(VENV)/developed: $(VENV)/created pyproject.toml
@@ -67,7 +67,7 @@ package: $(VENV)/developed
 	ls dist/*-abi3-*.whl dist/from-sdist/*-abi3-*.whl
 	wheel=$$(ls $(CURDIR)/dist/*.whl); \
 	$(BIN)/pip install --quiet --force-reinstall --no-deps "$$wheel"; \
-	$(BIN)/pip install --quiet "tdcr[plot,mesh,sobol] @ file://$$wheel"
+	$(BIN)/pip install --quiet "tdcr[plot,mesh,sobol,parquet] @ file://$$wheel"
 	@touch $(VENV)/installed
 
 python-checks: package

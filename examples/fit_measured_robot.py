@@ -2,10 +2,10 @@
 
 1,620 pulls of nine tendons and the marker at the tip (`examples/data`, ContinuumRoboticsLab's
 opencr-mujoco, MIT licence). Its displacements are positive when pulled, and about -10 mm when
-slack: here they are negative when pulled, and slack tendons are free. Models: constant curvature,
-coupled, and the rod with elastic tendons, of which only the ratio to the backbone's stiffness
-counts. A fifth of the rows, drawn by seed, is held out; the publisher's own validation file is not
-among the data, so figures that others reached on that one are not of the same rows.
+slack: `read_measurements` makes them negative when pulled, and slack tendons free. Models: constant
+curvature, coupled, and the rod with elastic tendons, of which only the ratio to the backbone's
+stiffness counts. A fifth of the rows, drawn by seed, is held out; the publisher's own validation
+file is not among the data, so figures that others reached on that one are not of the same rows.
 
     python examples/fit_measured_robot.py --output examples/figures
 """
@@ -18,7 +18,6 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 import tdcr
 from tdcr import design
@@ -28,7 +27,7 @@ LENGTHS, DISKS, RADIUS, MARKER = (0.060, 0.0625, 0.064), 6, 0.0045, 0.008
 # Published azimuths of the first tendon of each segment [rad]; the others follow by thirds.
 AZIMUTHS = (-3.0589, -2.5615, -2.0506)
 NEUTRAL = np.array([-2.269, 9.037, 187.895]) * 1e-3
-SLACK = -9.9
+SLACK_MM = 9.9
 CHOICES = (["gain"], ["gain", "offset"], ["gain", "base"], ["gain", "offset", "base"])
 ROD_CHOICES = (["stiffness"], ["gain", "offset", "base", "stiffness"])
 # A backbone of any stiffness, and what the fit of the tendons' starts from: 1000 N.
@@ -36,14 +35,10 @@ WIRE = {"youngs_modulus": 60e9, "diameter": 1e-3}
 STIFFNESS = 1e3
 MM = 1e3
 
-Array = NDArray[np.float64]
 
-
-def measurements() -> tuple[Array, Array]:
-    """Displacements (B, 9), negative pulls, and marker positions (B, 3) [m]."""
-    rows = np.genfromtxt(DATA, delimiter=",", skip_header=1, usecols=range(3, 15))
-    pulled, tips = rows[:, :9], rows[:, 9:]
-    return np.where(pulled <= SLACK, np.inf, -pulled / MM), tips / MM
+def measurements() -> tdcr.Measurements:
+    """Return pulls and marker positions: nine columns of displacements, the tip's x, y, z."""
+    return tdcr.read_measurements(DATA, unit="mm", pull_sign="positive", free_from=SLACK_MM)
 
 
 def nominal(elastic: bool = False) -> tdcr.Robot:
@@ -68,10 +63,9 @@ def nominal(elastic: bool = False) -> tdcr.Robot:
 
 def fitted(names: list[str]) -> design.Fit:
     """Return the fit of some parameters: of the rod, if the tendons' stiffness is among them."""
-    displacements, tips = measurements()
     elastic = "stiffness" in names
     model = "rod" if elastic else "constant_curvature"
-    return design.fit(nominal(elastic), tips, names, displacements=displacements, model=model)
+    return design.fit(nominal(elastic), measurements(), names, model=model)
 
 
 def row(label: str, fit: design.Fit, before: bool) -> str:

@@ -57,6 +57,7 @@ from tdcr._inverse import (
     inverse_solutions,
     track,
 )
+from tdcr._measurements import Measurements, read_measurements
 from tdcr._sensitivity import Gradient, Variation
 from tdcr._status import Status
 from tdcr._voxels import Volume, VoxelMap
@@ -83,6 +84,7 @@ __all__ = [
     "LinkageSettings",
     "Loads",
     "Manipulability",
+    "Measurements",
     "Mesh",
     "NotConverged",
     "Obstacle",
@@ -116,6 +118,7 @@ __all__ = [
     "manipulability",
     "planar",
     "pso",
+    "read_measurements",
     "sensitivity",
     "track",
     "workspace",

@@ -12,6 +12,8 @@ from tdcr._progress import told
 from tdcr._value import same
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from numpy.typing import ArrayLike, NDArray
 
     from tdcr._core import (
@@ -30,7 +32,7 @@ __all__ = ["ShapeBatch", "forward_batch"]
 
 FIELDS = _core._fields()
 
-_CONTACT = np.dtype(
+CONTACT = np.dtype(
     [
         ("row", np.int64),
         ("disk", np.int64),
@@ -185,6 +187,53 @@ class ShapeBatch(Sequence["Shape"]):
         own = self.displacements[row]
         return _core.forward(self.robot, own, model=self.model, settings=settings, **around)
 
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the batch into a file that appears complete or not at all.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            Ending in .npz or .json, which `load` reads back equal;
+            or in .csv or .parquet, for other programs: displacements and computed fields by row,
+            but for rotations, strains, holes and contacts. Replaced if it exists.
+
+        Raises
+        ------
+        InvalidInput
+            Another file ending; a `SignedDistance` among the obstacles, whose
+            functions no file holds.
+        ImportError
+            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
+        OSError
+            The file cannot be written.
+        """
+        from tdcr._saving import save
+
+        save(self, path)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> ShapeBatch:
+        """Read a batch that `save` wrote. No code of a file is run.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            File ending in .npz or .json.
+
+        Raises
+        ------
+        InvalidInput
+            Another file: names path and field, what was expected and what was there.
+        ImportError
+            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
+        OSError
+            The file cannot be read.
+        """
+        from tdcr._saving import load
+
+        loaded: ShapeBatch = load(path, "ShapeBatch")
+        return loaded
+
     def __repr__(self) -> str:
         """Tell size, outcome and fields."""
         converged = int(np.count_nonzero(self._columns["ok"]))
@@ -277,7 +326,7 @@ def forward_batch(
 
 def _table(columns: dict[str, Any]) -> NDArray[np.void]:
     """Make records of the columns of contacts."""
-    table = np.empty(len(columns["row"]), _CONTACT)
+    table = np.empty(len(columns["row"]), CONTACT)
     for name, values in columns.items():
         table[name] = values
     table.flags.writeable = False

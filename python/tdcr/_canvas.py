@@ -12,14 +12,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tdcr._arguments import numbers
 from tdcr._core import Cylinder, HalfSpace
 from tdcr._plot_obstacles import section, surface
 from tdcr._view import Plane, smooth
+from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
     from tdcr._core import Shape
 
-__all__ = ["Flat", "Scene", "Solid", "draw", "draw_forces"]
+__all__ = ["Flat", "Scene", "Solid", "draw", "draw_forces", "draw_marks", "places_of"]
 
 Unit = Literal["auto", "m", "mm"]
 Points = NDArray[np.float64]
@@ -27,7 +29,7 @@ Points = NDArray[np.float64]
 # Okabe and Ito's colours, which the colour-blind can tell apart; black and yellow left out.
 _COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _BACKBONE, _DISK, _BASE = "#B9BEC5", "#5F6670", "#22262B"
-_OBSTACLE, _FORCE = "#8C7A5B", "#7B1FA2"
+_OBSTACLE, _FORCE, _MARK = "#8C7A5B", "#7B1FA2", "#000000"
 _MOST_DISKS = 60
 _SLACK = 1e-6  # share of its rest length by which a tendon must be loose to be drawn slack
 
@@ -299,3 +301,24 @@ def draw_forces(canvas: Flat | Solid, scene: Scene, largest: float | None = None
     unit = 0.25 * scene.shape.robot.backbone.total_length * scene.scale / largest
     for contact, force in zip(scene.shape.contacts, forces, strict=True):
         canvas.arrow(contact.point * scene.scale, force * unit)
+
+
+def places_of(marks: Any) -> Points:
+    """Check places to mark."""
+    places = numbers("marks", marks)
+    if places.ndim != 2 or places.shape[1] != 3:
+        message = f"marks: expected places of shape (m, 3), got shape {places.shape}"
+        raise InvalidInput(message, "marks")
+    return places
+
+
+def draw_marks(canvas: Flat | Solid, scene: Scene, places: Points) -> None:
+    """Draw a cross at a single place, a line through several, with dots where they lie apart."""
+    style: dict[str, Any] = {"linewidth": 0.8}
+    if len(places) == 1:
+        style = {"marker": "x", "markersize": 8.0, "markeredgewidth": 2.0}
+    else:
+        steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        if steps.mean() > 0.015 * scene.shape.robot.backbone.total_length:
+            style |= {"marker": "o", "markersize": 2.2}
+    canvas.line(places * scene.scale, color=_MARK, zorder=3.5, **style)

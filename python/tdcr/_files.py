@@ -8,11 +8,8 @@ the field, what was expected and what was there. Imported on first use by ``Robo
 
 from __future__ import annotations
 
-import errno
 import json
 import os
-import secrets
-import shutil
 import textwrap
 import tomllib
 from pathlib import Path
@@ -34,9 +31,10 @@ from tdcr._file_schema import (
     metres,
     robot_schema,
 )
+from tdcr._replace import replace_file
 from tdcr.errors import InvalidInput
 
-__all__ = ["load_robot", "robot_schema", "save_robot"]
+__all__ = ["load_robot", "parsed", "robot_data", "robot_of", "robot_schema", "save_robot"]
 
 StrPath: TypeAlias = str | os.PathLike[str]
 
@@ -62,7 +60,11 @@ def load_robot(path: StrPath) -> Robot:
         The file cannot be read.
     """
     kind = _kind(path)
-    data = _parse(path, Path(path).read_bytes(), kind)
+    return robot_of(path, parsed(path, Path(path).read_bytes(), kind))
+
+
+def robot_of(path: StrPath, data: Any) -> Robot:
+    """Build a robot from the tables of a file; faults start with the path."""
     try:
         table = RobotTable.model_validate(data)
     except ValidationError as error:
@@ -82,7 +84,8 @@ def _kind(path: StrPath) -> str:
     return kind
 
 
-def _parse(path: StrPath, raw: bytes, kind: str) -> Any:
+def parsed(path: StrPath, raw: bytes, kind: str) -> Any:
+    """Parse the text of a TOML or JSON file; faults start with the path."""
     name = kind[1:].upper()
     try:
         text = raw.decode("utf-8-sig")
@@ -176,12 +179,12 @@ def save_robot(robot: Robot, path: StrPath) -> None:
         The file cannot be written.
     """
     kind = _kind(path)
-    data = _data(robot)
+    data = robot_data(robot)
     text = _toml(data) if kind == ".toml" else json.dumps(data, indent=2, ensure_ascii=False) + "\n"
-    _replace(Path(os.path.realpath(path)), text.encode())
+    replace_file(path, lambda stream: stream.write(text.encode()))
 
 
-def _data(robot: Robot) -> dict[str, Any]:
+def robot_data(robot: Robot) -> dict[str, Any]:
     """Say what a robot file says of a robot; keys in the order of reading."""
     spine = robot.backbone
     backbone = _said(
@@ -258,20 +261,3 @@ def _entry(key: str, value: Any) -> str:
     numbers = textwrap.fill(", ".join(map(repr, value)), 96, initial_indent="  ",
                             subsequent_indent="  ", break_on_hyphens=False)  # fmt: skip
     return f"{key} = [\n{numbers},\n]"
-
-
-def _replace(target: Path, content: bytes) -> None:
-    """Write beside the target, then take its place in one step."""
-    beside = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    if not target.parent.is_dir():
-        # Else the error would name the file beside it.
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(target))
-    try:
-        with beside.open("xb") as stream:
-            stream.write(content)
-        if target.exists():
-            shutil.copymode(target, beside)
-        beside.replace(target)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise

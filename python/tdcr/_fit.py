@@ -10,6 +10,7 @@ import numpy as np
 
 from tdcr._core import Robot
 from tdcr._fit_model import NAMES, Measured, Problem
+from tdcr._measurements import Measurements
 from tdcr._status import Status
 from tdcr._value import Value
 from tdcr.errors import InvalidInput, NotConverged
@@ -142,10 +143,10 @@ class Fit(Value):
 
 def fit(
     robot: Robot,
-    measurements: ArrayLike,
+    measurements: ArrayLike | Measurements,
     parameters: Sequence[str],
     *,
-    displacements: ArrayLike,
+    displacements: ArrayLike | None = None,
     model: str = "rod",
     settings: RodSettings | ConstantCurvatureSettings | None = None,
     validation: float = 0.2,
@@ -164,9 +165,9 @@ def fit(
     ----------
     robot : Robot
         Where the fit starts. Its tool is what is measured if only one point is.
-    measurements : array_like, shape (B, 3) or (B, n + 1, 3)
+    measurements : array_like, shape (B, 3) or (B, n + 1, 3), or Measurements
         Positions of the tool point, or of all disks, world frame [m]. Rows with gaps (NaN) are
-        dropped and counted.
+        dropped and counted. What `tdcr.read_measurements` reads has the displacements with it.
     parameters : sequence of str
         What to estimate: "offset" and "gain" of each displacement (used are gain * displacement +
         offset), "radius" and "azimuth" of each tendon's holes (straight tendons), "stiffness" of
@@ -174,7 +175,7 @@ def fit(
         "rest" (a curvature about x and y, added to the rest shape), "base" (a shift, and a rotation
         about the base's origin, world axes).
     displacements : array_like, shape (B, K)
-        As for `forward_batch` [m]: negative pulls, `inf` is free.
+        As for `forward_batch` [m]: negative pulls, `inf` is free. Not with `Measurements`.
     model : {"rod", "constant_curvature"}, optional
         The latter has no "stiffness", no "poisson_ratio" and no "rest".
     settings : RodSettings or ConstantCurvatureSettings, optional
@@ -199,6 +200,7 @@ def fit(
     if max_iterations < 1:
         message = f"max_iterations: expected at least 1, got {max_iterations}"
         raise InvalidInput(message, "max_iterations")
+    displacements, measurements = _paired(displacements, measurements)
     problem, measured = _checked(
         robot, displacements, measurements, parameters, model, settings, validation
     )
@@ -244,6 +246,20 @@ def fit(
         iterations=iterations,
         seed=seed,
     )
+
+
+def _paired(
+    displacements: ArrayLike | None, measurements: ArrayLike | Measurements
+) -> tuple[ArrayLike, ArrayLike]:
+    """Give displacements and positions, of which measurements have both."""
+    if isinstance(measurements, Measurements):
+        if displacements is not None:
+            message = "displacements: expected none with Measurements, which have their own"
+            raise InvalidInput(message, "displacements")
+        return measurements.displacements, measurements.positions
+    if displacements is None:
+        raise TypeError("displacements: expected an array, or Measurements as measurements")
+    return displacements, measurements
 
 
 def _checked(

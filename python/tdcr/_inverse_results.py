@@ -15,6 +15,8 @@ from tdcr._value import Value
 from tdcr.errors import NotConverged
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from numpy.typing import NDArray
 
     from tdcr._core import (
@@ -115,6 +117,46 @@ class Inverse(Value):
             return self
         raise NotConverged(f"{self.status}: {self.message}", self)
 
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the answer into a file that appears complete or not at all.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            Ending in .npz or .json, which `load` reads back equal. Replaced if it exists.
+
+        Raises
+        ------
+        InvalidInput
+            Another file ending.
+        OSError
+            The file cannot be written.
+        """
+        from tdcr._saving import save
+
+        save(self, path)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Inverse:
+        """Read an answer that `save` wrote. No code of a file is run.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            File ending in .npz or .json.
+
+        Raises
+        ------
+        InvalidInput
+            Another file: names path and field, what was expected and what was there.
+        OSError
+            The file cannot be read.
+        """
+        from tdcr._saving import load
+
+        loaded: Inverse = load(path, "Inverse")
+        return loaded
+
     def __repr__(self) -> str:
         """Tell the outcome and the displacements."""
         pulls = np.array2string(
@@ -200,6 +242,51 @@ class InverseBatch(Value, Sequence[Inverse]):
             off += f" and {self.rotation_error[i]:.3g} rad"
         tried = int(self.starts[i])
         return f"row {i} is {off} off the target after {tried} start{'s' if tried != 1 else ''}"
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the answers into a file that appears complete or not at all.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            Ending in .npz or .json, which `load` reads back equal;
+            or in .csv or .parquet, for other programs: a row per target. Replaced if it exists.
+
+        Raises
+        ------
+        InvalidInput
+            Another file ending.
+        ImportError
+            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
+        OSError
+            The file cannot be written.
+        """
+        from tdcr._saving import save
+
+        save(self, path)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> InverseBatch:
+        """Read answers that `save` wrote. No code of a file is run.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            File ending in .npz or .json.
+
+        Raises
+        ------
+        InvalidInput
+            Another file: names path and field, what was expected and what was there.
+        ImportError
+            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
+        OSError
+            The file cannot be read.
+        """
+        from tdcr._saving import load
+
+        loaded: InverseBatch = load(path, "InverseBatch")
+        return loaded
 
     def __repr__(self) -> str:
         """Tell size and outcome."""

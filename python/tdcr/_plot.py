@@ -11,21 +11,22 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tdcr._canvas import Flat, Scene, Solid, Unit, draw, draw_forces
+from tdcr._canvas import Flat, Points, Scene, Solid, Unit, draw, draw_forces, draw_marks, places_of
 from tdcr._view import Plane, plane_of
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
     from tdcr._core import Shape
 
-__all__ = ["one_of", "plot_shape", "require_matplotlib", "save_picture"]
+__all__ = ["FAILED", "check_picture", "one_of", "plot_shape", "require_matplotlib", "save_picture"]
 
 View = Literal["auto", "2d", "3d"]
 
-_FAILED = "#B3261E"
+FAILED = "#B3261E"
 
 
 def plot_shape(
@@ -37,6 +38,7 @@ def plot_shape(
     tendons: bool = True,
     obstacles: bool = True,
     contacts: bool = True,
+    marks: ArrayLike | None = None,
     legend: bool = True,
     title: str | None = None,
     unit: Unit = "auto",
@@ -51,7 +53,7 @@ def plot_shape(
         Axes to draw into, plain or 3-D. Default: those of a new pyplot figure.
     view : {"auto", "2d", "3d"}
         "2d" looks at the plane through the base axis in which the shape bends. "auto" takes it when
-        the shape stays in that plane, or else 3-D; given Axes decide for themselves.
+        the shape and the marks stay in that plane, or else 3-D; given Axes decide for themselves.
     disks : bool
         Draw the disks, of `Backbone.disk_radius` or else 1.15 times the largest hole radius; of
         more than 60 every second, third, ...
@@ -62,6 +64,8 @@ def plot_shape(
         length away (not those of a `SignedDistance`).
     contacts : bool
         Draw the contact forces as arrows, the largest a quarter of the robot's length.
+    marks : array_like, shape (m, 3)
+        Places to mark, in their order: a target, a path [m].
     legend : bool
         Name the tendons and how far each is pulled or released.
     title : str, optional
@@ -86,7 +90,8 @@ def plot_shape(
     one_of("unit", unit, ("auto", "m", "mm"))
     scene = Scene.of(shape, unit)
     plane = plane_of(shape)
-    flat = _is_flat(view, plane, ax)
+    places = None if marks is None else places_of(marks)
+    flat = _is_flat(shape, view, plane, ax, places)
     if ax is None:
         from matplotlib import pyplot
 
@@ -97,6 +102,8 @@ def plot_shape(
     draw(canvas, scene, disks, tendons)
     if contacts:
         draw_forces(canvas, scene)
+    if places is not None and len(places):
+        draw_marks(canvas, scene, places)
     canvas.finish()
     _label(ax, scene, title, legend and tendons)
     return ax
@@ -129,7 +136,9 @@ def save_picture(shape: Shape, path: str | os.PathLike[str], **options: Any) -> 
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=_SIZE, layout="constrained")
-    flat = _is_flat(options.get("view", "auto"), plane_of(shape), None)
+    marks = options.get("marks")
+    places = None if marks is None else places_of(marks)
+    flat = _is_flat(shape, options.get("view", "auto"), plane_of(shape), None, places)
     plot_shape(shape, ax=_axes(figure, flat), **options)
     figure.savefig(path, dpi=160, bbox_inches="tight")
 
@@ -173,13 +182,23 @@ def one_of(argument: str, value: str, names: tuple[str, ...]) -> None:
         raise InvalidInput(f"{argument}: expected {expected}, got {value!r}", argument)
 
 
-def _is_flat(view: View, plane: Plane, ax: Axes | None) -> bool:
+def _is_flat(
+    shape: Shape, view: View, plane: Plane, ax: Axes | None, places: Points | None
+) -> bool:
     if ax is None:
-        return plane.holds if view == "auto" else view == "2d"
+        return plane.holds and _lie_in(shape, plane, places) if view == "auto" else view == "2d"
     flat = ax.name != "3d"
     if view != "auto" and flat != (view == "2d"):
         raise InvalidInput(f'view: expected "{ax.name}" to suit the Axes, got {view!r}', "view")
     return flat
+
+
+def _lie_in(shape: Shape, plane: Plane, places: Points | None) -> bool:
+    """Whether marked places are in the plane too."""
+    if places is None:
+        return True
+    off = (places - shape.robot.base[:3, 3]) @ plane.normal
+    return bool(np.abs(off).max(initial=0.0) <= 1e-6 * shape.robot.backbone.total_length)
 
 
 def _axes(figure: Figure, flat: bool) -> Axes:
@@ -207,14 +226,14 @@ def _label(ax: Any, scene: Scene, title: str | None, legend: bool) -> None:
         title = f"{title}\n{textwrap.fill(text, 80)}".lstrip("\n")
     if title:
         # Names and messages are text, not formulas: a "$" in them is a "$".
-        ax.set_title(title, fontsize=10, color="black" if shape.ok else _FAILED, parse_math=False)
+        ax.set_title(title, fontsize=10, color="black" if shape.ok else FAILED, parse_math=False)
     if legend and shape.robot.tendons:
         count = len(shape.robot.tendons)
         entries = ax.legend(
             fontsize=8,
             frameon=False,
             loc="upper center",
-            bbox_to_anchor=(0.5, -0.12 if ax.name != "3d" else 0.0),
+            bbox_to_anchor=(0.5, -0.12),
             ncols=min(count, 4 if count != 6 else 3),
             title="tendons",
             title_fontsize=8,

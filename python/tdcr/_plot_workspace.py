@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tdcr._plot import one_of, require_matplotlib
+from tdcr._plot import check_picture, one_of, require_matplotlib
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from tdcr._voxels import VoxelMap
     from tdcr._workspace_results import Workspace
 
-__all__ = ["plot_workspace"]
+__all__ = ["plot_workspace", "save_workspace"]
 
 View = Literal["section", "3d"]
 Shown = Literal["dexterity", "manipulability", "samples"]
@@ -74,6 +75,16 @@ def plot_workspace(
         ax.set_title(text, fontsize=10, parse_math=False)
     drawn: Axes = ax
     return drawn
+
+
+def save_workspace(workspace: Workspace, path: str | os.PathLike[str], **options: Any) -> None:
+    """Draw a workspace into a file, without pyplot; see `tdcr._plot.save_picture`."""
+    check_picture(path)
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=_SIZE, layout="constrained")
+    plot_workspace(workspace, ax=_axes(figure, options.get("view") == "3d"), **options)
+    figure.savefig(path, dpi=160, bbox_inches="tight")
 
 
 def _axes(figure: Figure, solid: bool) -> Axes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Sequence
@@ -19,47 +18,25 @@ if TYPE_CHECKING:
 
     from tdcr._core import Shape
 
-__all__ = ["as_json", "print_demo", "print_shape"]
+__all__ = [
+    "as_json",
+    "console_of",
+    "facts_table",
+    "print_demo",
+    "print_shape",
+    "table_of",
+    "text_of",
+    "vector_text",
+]
 
 
-def as_json(shape: Shape) -> str:
-    """Write a shape as JSON text: SI units, "inf" for free tendons, null for what is not known."""
-    robot = shape.robot
-    data = {
-        "robot": robot.name,
-        "model": shape.model,
-        "status": str(shape.status),
-        "ok": shape.ok,
-        "message": shape.message,
-        "residual": shape.residual,
-        "iterations": shape.iterations,
-        "units": shape.units,
-        "tendon_names": list(robot.tendon_names),
-        "displacements": shape.displacements.tolist(),
-        "tendon_lengths": shape.tendon_lengths.tolist(),
-        "tensions": shape.tensions.tolist(),
-        "energy": shape.energy,
-        "tip": shape.tip.tolist(),
-        "positions": shape.positions.tolist(),
-        "frames": shape.frames.tolist(),
-        "strains": shape.strains.tolist(),
-        "tendon_points": [points.tolist() for points in shape.tendon_points],
-    }
-    return json.dumps(_standard(data), ensure_ascii=False, allow_nan=False)
+def as_json(result: Any) -> str:
+    """Write a result as JSON text: what its `save` writes into a .json file."""
+    from tdcr._container import header_text
+    from tdcr._save_kinds import KINDS
 
-
-def _standard(value: Any) -> Any:
-    """Replace the numbers that JSON has not."""
-    match value:
-        case dict():
-            return {key: _standard(one) for key, one in value.items()}
-        case list():
-            return [_standard(one) for one in value]
-        case float() if math.isnan(value):
-            return None
-        case float() if math.isinf(value):
-            return "inf" if value > 0 else "-inf"
-    return value
+    kind = type(result).__name__
+    return header_text(kind, KINDS[kind].said(result))
 
 
 def print_shape(shape: Shape, unit: str) -> None:
@@ -71,32 +48,29 @@ def print_shape(shape: Shape, unit: str) -> None:
     unit : {"m", "mm"}
         Unit of the lengths in the table.
     """
-    console = _console()
+    console = console_of()
     scale = 1000.0 if unit == "mm" else 1.0
     digits = 3 if unit == "mm" else 6
-    facts = _table(console, "", "")
-    facts.show_header = False
-    facts.columns[1].justify = "left"
-    for name, text in (
+    facts = facts_table(
+        console,
         ("robot", shape.robot.name or "unnamed"),
         ("model", shape.model),
         ("status", str(shape.status)),
         ("iterations", str(shape.iterations)),
-        (f"tip position x y z [{unit}]", _vector(shape.tip[:3, 3] * scale, digits)),
-        ("tip rotation vector x y z [deg]", _vector(_degrees(shape), 3)),
-    ):
-        facts.add_row(_text(name), _text(text))
+        (f"tip position x y z [{unit}]", vector_text(shape.tip[:3, 3] * scale, digits)),
+        ("tip rotation vector x y z [deg]", vector_text(_degrees(shape), 3)),
+    )
     known = bool(np.isfinite(shape.tensions).any())
     force = "N" if shape.units == "N" else "EI/m^2"
     headers = [f"{name} [{unit}]" for name in ("displacement", "rest length", "length")]
-    tendons = _table(console, "tendon", *headers, *([f"tension [{force}]"] if known else []))
+    tendons = table_of(console, "tendon", *headers, *([f"tension [{force}]"] if known else []))
     for k, name in enumerate(shape.robot.tendon_names):
         by = shape.displacements[k]
         lengths = (shape.robot.rest_lengths[k], shape.tendon_lengths[k])
         row = ["free" if math.isinf(by) else f"{by * scale:+.{digits}f}"]
         row += [f"{length * scale:.{digits}f}" for length in lengths]
         row += [f"{shape.tensions[k]:.6g}"] if known else []
-        tendons.add_row(_text(name), *row)
+        tendons.add_row(text_of(name), *row)
     console.print(facts)
     console.print()
     console.print(tendons)
@@ -111,7 +85,7 @@ def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
     times : sequence of float
         Time of each solve [s].
     """
-    console = _console()
+    console = console_of()
     headers = (
         "tip\n[mm]",
         "rotation\n[deg]",
@@ -120,22 +94,32 @@ def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
         "steps",
         "time\n[us]",
     )
-    table = _table(console, "robot", *headers)
+    table = table_of(console, "robot", *headers)
     for shape, time in zip(shapes, times, strict=True):
         lengths = zip(shape.robot.tendon_names, shape.tendon_lengths * 1000.0, strict=True)
         table.add_row(
-            _text(shape.robot.name or "unnamed"),
+            text_of(shape.robot.name or "unnamed"),
             "\n".join(
                 f"{x} {value:7.1f}" for x, value in zip("xyz", _millimetres(shape), strict=True)
             ),
             "\n".join(f"{value + 0.0:.1f}" for value in _degrees(shape).round(1)),
-            _text("\n".join(f"{name} {length:.1f}" for name, length in lengths)),
+            text_of("\n".join(f"{name} {length:.1f}" for name, length in lengths)),
             str(shape.status),
             str(shape.iterations),
             f"{time * 1e6:.1f}",
         )
         table.add_section()
     console.print(table)
+
+
+def facts_table(console: Console, *facts: tuple[str, str]) -> Table:
+    """Make a table of names and what they are."""
+    table = table_of(console, "", "")
+    table.show_header = False
+    table.columns[1].justify = "left"
+    for name, text in facts:
+        table.add_row(text_of(name), text_of(text))
+    return table
 
 
 def _millimetres(shape: Shape) -> NDArray[np.float64]:
@@ -149,19 +133,19 @@ def _degrees(shape: Shape) -> NDArray[np.float64]:
     return degrees
 
 
-def _vector(values: NDArray[np.float64], digits: int) -> str:
+def vector_text(values: NDArray[np.float64], digits: int) -> str:
     # Adding 0.0 after rounding turns -0.0 into 0.0.
     return "  ".join(f"{round(float(value), digits) + 0.0:.{digits}f}" for value in values)
 
 
-def _text(text: str) -> Any:
+def text_of(text: str) -> Any:
     """Text of a user's: square brackets in it are no markup."""
     from rich.text import Text
 
     return Text(text)
 
 
-def _console() -> Console:
+def console_of() -> Console:
     from rich.console import Console
 
     # Into a pipe or a file: plain, and no line is broken to fit a terminal.
@@ -170,7 +154,7 @@ def _console() -> Console:
     )  # fmt: skip
 
 
-def _table(console: Console, *headers: str) -> Table:
+def table_of(console: Console, *headers: str) -> Table:
     from rich import box
     from rich.table import Table
     from rich.text import Text

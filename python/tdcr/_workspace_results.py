@@ -18,6 +18,8 @@ from tdcr._voxels import Grid, Volume, VoxelMap, default_voxel, solid_angles, vo
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
@@ -274,6 +276,52 @@ class Workspace(Value):
         from tdcr._plot_workspace import plot_workspace
 
         return plot_workspace(self, **options)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the workspace into a file that appears complete or not at all.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            Ending in .npz or .json or .parquet, which `load` reads back equal;
+            or in .csv, for other programs: a row per sample. Replaced if it exists.
+
+        Raises
+        ------
+        InvalidInput
+            Another file ending; a `SignedDistance` among the obstacles, whose
+            functions no file holds.
+        ImportError
+            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
+        OSError
+            The file cannot be written.
+        """
+        from tdcr._saving import save
+
+        save(self, path)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Workspace:
+        """Read a workspace that `save` wrote. No code of a file is run.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            File ending in .npz or .json or .parquet.
+
+        Raises
+        ------
+        InvalidInput
+            Another file: names path and field, what was expected and what was there.
+        ImportError
+            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
+        OSError
+            The file cannot be read.
+        """
+        from tdcr._saving import load
+
+        loaded: Workspace = load(path, "Workspace")
+        return loaded
 
     def _points(self) -> Floats:
         """Tips of the rows that converged, or say that there are none."""

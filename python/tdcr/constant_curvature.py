@@ -173,7 +173,8 @@ def frames(
     base : array_like, shape (4, 4), optional
         Frame of the first segment's base. Default: identity.
     layout : {"homogeneous", "columns"}, optional
-        "columns" flattens every frame column by column, the layout of the field's plotting toolkit.
+        "columns" flattens every frame column by column, the layout of CRVisToolkit's `draw_tdcr`;
+        `Shape.plotting_layout` has it for any robot.
 
     Returns
     -------

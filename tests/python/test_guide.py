@@ -2,7 +2,8 @@
 
 The blocks of a page run in order and share names and a folder; those of the README stand alone.
 A block with a file name as its title is written to that file first, `text title="prints"` is what
-the block before it prints, and `console` holds commands with what they print.
+the block before it prints, and `console` holds commands with what they print; a command that fails
+is followed by `echo $?`.
 """
 
 import contextlib
@@ -32,14 +33,22 @@ def lines(text):
 
 def run_commands(block):
     """Every command of a block, and what it must print."""
+    code = 0
     for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
         command, expected = part.split("\n", 1)
+        if command == "echo $?":
+            assert lines(expected) == [str(code)]
+            code = 0
+            continue
+        assert code == 0, f"before {command}: exit code {code}, which no `echo $?` shows"
         program, *arguments = shlex.split(command)
         assert program == "tdcr"
         done = subprocess.run(
             [sys.executable, "-m", "tdcr", *arguments], capture_output=True, text=True, check=False
         )
         assert lines(done.stdout + done.stderr) == lines(expected), command
+        code = done.returncode
+    assert code == 0, f"exit code {code}, which no `echo $?` shows"
 
 
 @pytest.mark.parametrize("page", CODED, ids=lambda page: page.relative_to(ROOT).as_posix())

@@ -260,3 +260,30 @@ def test_space_shows_obstacles_of_every_kind():
     # Without contact there is nothing to draw, and the title says so.
     far = forward(robot(), [-0.01, INF, INF, INF], obstacles=tdcr.Sphere((1, 1, 1), 0.01))
     assert plot_shape(far).get_title().endswith("no contact")
+
+
+def test_marks_are_drawn_where_they_are():
+    shape = solve(-0.01, INF, INF, INF)
+    ax = plot_shape(shape, marks=[[0.3, 0.0, 0.1]])
+    assert ax.name != "3d"
+    (cross,) = [line for line in ax.lines if line.get_marker() == "x"]
+    assert np.allclose(cross.get_xydata(), [[300, 100]])
+    ax.figure.canvas.draw()
+    assert ax.get_xlim()[1] > 300
+    path = plot_shape(shape, marks=[[0.0, 0.0, 0.25], [0.1, 0.0, 0.25]], unit="m")
+    lines = [line.get_xydata().tolist() for line in path.lines]
+    assert [[0.0, 0.25], [0.1, 0.25]] in lines
+    # A place outside of the plane of the bend is seen in space alone.
+    solid = plot_shape(shape, marks=[[0.1, 0.3, 0.1]])
+    assert solid.name == "3d"
+    assert solid.get_ylim()[1] >= 300
+    assert plot_shape(shape, marks=[[0.1, 0.3, 0.1]], view="2d").name != "3d"
+
+
+@pytest.mark.parametrize("marks", [[1.0, 2.0, 3.0], [[1.0, 2.0]], [[[1.0, 2.0, 3.0]]]])
+def test_marks_of_another_shape_are_refused(marks, tmp_path):
+    shape = solve(-0.01, INF, INF, INF)
+    with pytest.raises(InvalidInput, match=r"marks: expected places of shape \(m, 3\)"):
+        shape.plot(marks=marks)
+    with pytest.raises(InvalidInput, match="marks"):
+        save_picture(shape, tmp_path / "a.png", marks=marks)

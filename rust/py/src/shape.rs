@@ -5,7 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use nalgebra::{Matrix3, Vector3};
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyTuple};
+use pyo3::types::{PyDict, PyList, PyTuple, PyType};
 
 use tdcr::Status;
 use tdcr::lie::Pose;
@@ -287,6 +287,61 @@ impl Shape {
         Err(Self::not_converged(slf))
     }
 
+    /// Writes the shape into a file.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     Ending in .npz or .json, which `load` reads back equal; or in .csv, for other programs: a
+    ///     row per disk with its position [m]. Replaced if it exists.
+    ///
+    /// Raises
+    /// ------
+    /// InvalidInput
+    ///     Another file ending; a `SignedDistance` among the obstacles, whose functions no file holds.
+    /// OSError
+    ///     The file cannot be written.
+    #[pyo3(signature = (path))]
+    fn save(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        slf.py().import("tdcr._saving")?.call_method1("save", (slf, path))?;
+        Ok(())
+    }
+
+    /// Reads a shape that `save` wrote. No code of a file is run.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     File ending in .npz or .json.
+    ///
+    /// Raises
+    /// ------
+    /// InvalidInput
+    ///     Not the file of a shape: names the path, the field, what was expected and what was found.
+    /// OSError
+    ///     The file cannot be read.
+    #[classmethod]
+    fn load<'py>(
+        class: &Bound<'py, PyType>,
+        path: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        class.py().import("tdcr._saving")?.call_method1("load", (path, "Shape"))
+    }
+
+    /// Frames in the layout of CRVisToolkit, the plotting toolkit of opencontinuumrobotics.com: the
+    /// argument `g` of its `draw_tdcr`, every frame flattened column by column. Its `seg_end` counts
+    /// rows from 1: disk k is row k + 1.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray, shape (n + 1, 16)
+    ///     Lengths in m.
+    fn plotting_layout(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let frames = &self.core.state.frames;
+        let columns = |frame: &Pose| frame.to_matrix().as_slice().to_vec();
+        frozen(py, frames.iter().flat_map(columns).collect(), &[frames.len(), 16])
+    }
+
     /// Draws the shape with matplotlib (an optional extra: `pip install tdcr[plot]`).
     ///
     /// Parameters
@@ -297,6 +352,8 @@ impl Shape {
     ///     "auto" is the plane of the bend where the shape stays in one.
     /// disks, tendons, obstacles, contacts, legend : bool, optional
     ///     What is drawn.
+    /// marks : array_like, shape (m, 3), optional
+    ///     Places to mark, in their order: a target, a path [m].
     /// title : str, optional
     ///     Default: name of the robot, model and status.
     /// unit : {"auto", "m", "mm"}, optional
@@ -452,5 +509,23 @@ pub(crate) fn _shape(
     let core = tdcr::Shape { state, report: Report { status, residual, iterations }, message };
     let choice = Choice::new(model, Some(settings))?;
     let displacements = list("displacements", displacements)?;
+    fits(&robot.get().0, &core.state, &displacements)?;
     Ok(Shape::new(robot.get().clone(), choice, displacements, core).among(around))
+}
+
+/// Refuses a state that is not one of the robot: its tendons' holes are looked up by disk.
+fn fits(robot: &tdcr::robot::Robot, state: &State, displacements: &[f64]) -> PyResult<()> {
+    let (disks, tendons) = (robot.backbone().subsegments() + 1, robot.paths().len());
+    for (name, expected, got) in [
+        ("frames", disks, state.frames.len()),
+        ("tendon_lengths", tendons, state.tendon_lengths.len()),
+        ("tensions", tendons, state.tensions.len()),
+        ("displacements", tendons, displacements.len()),
+    ] {
+        if got != expected {
+            let wanted = format!("{expected} rows, as the robot has");
+            return Err(crate::convert::wrong_shape(name, &wanted, &[got]));
+        }
+    }
+    Ok(())
 }

@@ -1,0 +1,99 @@
+"""The command ``tdcr``.
+
+Exit codes: 0 done, 1 a solve did not converge (its result is printed all the same), 2 input that
+cannot be used (one line on stderr), 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from tdcr import InvalidInput, __version__
+from tdcr._cli._design import design
+from tdcr._cli._fit import fit
+from tdcr._cli._forward import demo, forward, schema
+from tdcr._cli._inverse import inverse, track
+from tdcr._cli._plot import plot
+from tdcr._cli._workspace import workspace
+
+__all__ = ["main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    try:
+        code = _group.main(arguments, prog_name="tdcr", standalone_mode=False)
+        sys.stdout.flush()
+        return int(code or 0)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return 0
+    except click.ClickException as error:
+        return _refuse(" ".join(error.format_message().split()))
+    except (click.Abort, _Interrupted):
+        # On a terminal the line has a ^C already.
+        click.echo("\n" * sys.stderr.isatty() + "tdcr: interrupted", err=True)
+        return 130
+    except BrokenPipeError:
+        # The reader has gone (| head): nothing is left to say, also not at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        name = f"{error.filename}: " if error.filename else ""
+        return _refuse(f"{name}{error.strerror or error}")
+    except (InvalidInput, ImportError) as error:
+        return _refuse(str(error))
+
+
+def _refuse(message: str) -> int:
+    """One line on stderr, however many faults there are."""
+    first, *more = message.splitlines() or [""]
+    rest = f" (and {len(more)} more fault{'s' * (len(more) > 1)})" if more else ""
+    click.echo(f"tdcr: error: {first}{rest}", err=True)
+    return 2
+
+
+class _Interrupted(Exception):
+    """Ctrl-C, under a name for which click writes no line of its own."""
+
+
+class _Commands(click.Group):
+    def invoke(self, context: click.Context) -> Any:
+        try:
+            return super().invoke(context)
+        except KeyboardInterrupt:
+            raise _Interrupted from None
+
+
+@click.group(
+    "tdcr",
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Example: tdcr demo",
+)
+@click.version_option(__version__, prog_name="tdcr", message="%(prog)s %(version)s")
+def _group() -> None:
+    """Tendon-driven continuum robots: shapes from tendon displacements, and back.
+
+    Exit codes: 0 done, 1 a solve did not converge, 2 input that cannot be used, 130 interrupted.
+    """
+
+
+for _command in (forward, inverse, track, workspace, design, fit, plot, demo, schema):
+    _group.add_command(_command)

@@ -1,0 +1,166 @@
+"""``tdcr inverse`` and ``tdcr track``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+import tdcr
+from tdcr import InvalidInput, Robot
+from tdcr._cli import _shared as own
+
+__all__ = ["inverse", "track"]
+
+_BOUNDS = click.option(
+    "--bounds",
+    nargs=2,
+    type=float,
+    metavar="LOW HIGH",
+    help="Least and greatest displacement of every tendon.",
+)
+
+
+@click.command(
+    "inverse",
+    epilog="\b\nExamples:\n  tdcr inverse trunk.toml --position 60 20 150 --unit mm\n"
+    "  tdcr inverse trunk.toml --position 0.06 0.02 0.15 --rotation 0 40 0 "
+    "--model constant_curvature",
+)
+@own.ROBOT
+@click.option("--position", nargs=3, type=float, metavar="X Y Z", help="Where the tool should be.")
+@click.option(
+    "--rotation",
+    nargs=3,
+    type=float,
+    metavar="RX RY RZ",
+    help="Rotation vector of the tool in degrees, with --position: how it should be turned.",
+)
+@click.option(
+    "--pose",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Instead: the 4x4 frame of the tool by rows, numbers with commas or spaces between them.",
+)
+@own.model_option("rod", "constant_curvature")
+@_BOUNDS
+@own.unit_option("the position, the bounds, the last column of a pose")
+@own.json_option
+@own.picture_option
+@own.output_option("the answer", ".npz", ".json")
+def inverse(
+    robot: Path,
+    position: tuple[float, float, float] | None,
+    rotation: tuple[float, float, float] | None,
+    pose: Path | None,
+    model: str,
+    bounds: tuple[float, float] | None,
+    unit: str,
+    json_file: str | None,
+    plot_file: str | None,
+    output: str | None,
+) -> int:
+    """Find the displacements that bring the tool of the robot in file ROBOT to a target."""
+    from tdcr import _report_results as report
+
+    if (position is None) == (pose is None) or (pose is not None and rotation is not None):
+        raise click.UsageError("expected --position X Y Z, with or without --rotation, or --pose")
+    own.checked_picture(plot_file)
+    arm = Robot.load(robot)
+    target = _pose(pose, unit) if pose is not None else _target(position, rotation, unit)
+    answer = tdcr.inverse(arm, target, model=model, bounds=_bounds(bounds, unit))
+    own.printed(
+        json_file, lambda: report.as_json(answer), lambda: report.print_inverse(answer, unit)
+    )
+    own.written(output, answer.save)
+    if plot_file is not None:
+        marks = answer.target[None, :3, 3] if answer.target.ndim == 2 else answer.target[None]
+        own.picture(answer.shape, plot_file, marks)
+    return own.said(answer.ok, arm.name, answer.status, answer.message)
+
+
+def _bounds(bounds: tuple[float, float] | None, unit: str) -> Any:
+    return None if bounds is None else tuple(own.in_metres(bounds, unit))
+
+
+def _target(position: Any, rotation: Any, unit: str) -> Any:
+    import numpy as np
+
+    place = np.array(own.in_metres(position, unit))
+    if rotation is None:
+        return place
+    frame = np.eye(4)
+    frame[:3, :3] = _turned(np.radians(rotation))
+    frame[:3, 3] = place
+    return frame
+
+
+def _turned(vector: Any) -> Any:
+    """Rotation matrix of a rotation vector, by Rodrigues' formula."""
+    import numpy as np
+
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return np.eye(3)
+    # The skew matrix of the axis.
+    cross = np.cross(np.eye(3), vector / angle)
+    turned: Any = np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
+    return turned
+
+
+def _pose(path: Path, unit: str) -> Any:
+    import numpy as np
+
+    try:
+        rows = [line.replace(",", " ").split() for line in path.read_text("utf-8").splitlines()]
+        frame = np.array([[float(word) for word in row] for row in rows if row])
+    except ValueError:
+        frame = np.empty(0)
+    if frame.shape != (4, 4):
+        message = f"{path}: expected four rows of four numbers, a homogeneous matrix"
+        raise InvalidInput(message, "pose")
+    frame[:3, 3] = own.in_metres(frame[:3, 3].tolist(), unit)
+    return frame
+
+
+@click.command(
+    "track",
+    epilog="\b\nExample:\n  tdcr track trunk.toml circle.csv --unit mm --output pulls.csv",
+)
+@own.ROBOT
+@click.argument("path", type=click.Path(path_type=Path))
+@own.model_option("rod", "constant_curvature")
+@_BOUNDS
+@own.target_option
+@own.json_option
+@own.picture_option
+@own.output_option("the pulls of every row", ".csv", ".npz", ".json", ".parquet")
+def track(
+    robot: Path,
+    path: Path,
+    model: str,
+    bounds: tuple[float, float] | None,
+    unit: str | None,
+    json_file: str | None,
+    plot_file: str | None,
+    output: str | None,
+) -> int:
+    """Follow the path in PATH with the tool of the robot in file ROBOT.
+
+    PATH is a CSV file with columns x, y and z, a row per point. Every answer goes on from the one
+    before.
+    """
+    from tdcr import _report_results as report
+
+    own.checked_picture(plot_file)
+    arm = Robot.load(robot)
+    targets, unit = own.points(path, unit)
+    found = tdcr.track(
+        arm, targets, model=model, bounds=_bounds(bounds, unit), progress=own.progress()
+    )
+    own.printed(json_file, lambda: report.as_json(found), lambda: report.print_track(found, unit))
+    own.written(output, found.save)
+    if plot_file is not None:
+        own.picture(found[-1].shape, plot_file, targets)
+    return own.rows_said(found)

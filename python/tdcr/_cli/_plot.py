@@ -1,0 +1,140 @@
+"""``tdcr plot``."""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+import tdcr
+from tdcr import InvalidInput, Inverse, InverseBatch, Robot, Shape, ShapeBatch, Workspace
+from tdcr._cli import _shared as own
+
+__all__ = ["plot"]
+
+
+@click.command(
+    "plot",
+    epilog="\b\nExamples:\n  tdcr plot pulled.npz --output pulled.png\n"
+    '  tdcr plot trunk.toml --pull "-20 free free" --unit mm --animate pull.gif',
+)
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    callback=own.writable,
+    metavar="FILE",
+    help="The picture: .png, .pdf, .svg, ...",
+)
+@click.option(
+    "--animate",
+    callback=own.writable,
+    metavar="FILE",
+    help="Of a robot: a GIF of the pull, from rest.",
+)
+@own.displacements_option(required=False)
+@own.model_option("rod", "linkage", "constant_curvature")
+@own.unit_option("the displacements")
+@click.option(
+    "--view",
+    type=click.Choice(["auto", "2d", "3d"]),
+    default="auto",
+    show_default=True,
+    help="In the plane of the bend, or in space. A workspace is cut by a plane but for 3d.",
+)
+@click.option("--row", type=int, metavar="ROW", help="Of a batch or a track: which row.")
+@click.option(
+    "--frames",
+    type=click.IntRange(2, 500),
+    default=40,
+    show_default=True,
+    help="Steps of the animation.",
+)
+def plot(
+    file: Path,
+    output: str | None,
+    animate: str | None,
+    displacements: list[float] | None,
+    model: str,
+    unit: str,
+    view: str,
+    row: int | None,
+    frames: int,
+) -> int:
+    """Draw what is in FILE: a robot, or a result that was saved.
+
+    A robot (.toml, .json) is drawn under --pull, or at rest; results are shapes, inverses, batches
+    and workspaces (.npz, .json, .parquet).
+    """
+    if output is None and animate is None:
+        raise click.UsageError("expected --output FILE, --animate FILE or both")
+    own.checked_picture(output)
+    thing = _read(file)
+    if not isinstance(thing, Robot) and (displacements is not None or animate is not None):
+        got = f"{file} with a {type(thing).__name__}"
+        raise click.UsageError(f"--pull and --animate: expected a robot file, got {got}")
+    if isinstance(thing, Workspace):
+        from tdcr._plot_workspace import save_workspace
+
+        save_workspace(thing, str(output), view="3d" if view == "3d" else "section")
+        return 0
+    pulls = None if displacements is None else own.in_metres(displacements, unit)
+    if animate is not None:
+        _animate(thing, pulls, model, animate, frames)
+    shape = _shape(thing, pulls, model, row)
+    if output is not None:
+        from tdcr._plot import save_picture
+
+        save_picture(shape, output, view=view)
+    return own.said(shape.ok, shape.robot.name, shape.status, shape.message)
+
+
+def _read(file: Path) -> Any:
+    """Read a robot or a result, whichever it is."""
+    if file.suffix.lower() == ".toml":
+        return Robot.load(file)
+    from tdcr._saving import load_any
+
+    if file.suffix.lower() == ".json":
+        from tdcr._files import parsed
+
+        data = parsed(file, file.read_bytes(), ".json")
+        if isinstance(data, dict) and "kind" not in data:
+            return Robot.load(file)
+    elif file.suffix.lower() not in (".npz", ".parquet"):
+        expected = "a file ending in .toml, .json, .npz or .parquet"
+        raise InvalidInput(f"file: expected {expected}, got '{file}'", "file")
+    return load_any(file)
+
+
+def _shape(thing: Any, pulls: list[float] | None, model: str, row: int | None) -> Shape:
+    """Shape to draw of a robot or a result."""
+    if isinstance(thing, (ShapeBatch, InverseBatch)):
+        if row is None or not -len(thing) <= row < len(thing):
+            expected = f"expected a row from 0 to {len(thing) - 1}"
+            raise click.UsageError(f"--row: {expected}, got {'none' if row is None else row}")
+        thing = thing[row]
+    elif row is not None:
+        raise click.UsageError(f"--row: expected a batch or a track, got {type(thing).__name__}")
+    if isinstance(thing, Robot):
+        return tdcr.forward(thing, pulls or [inf] * len(thing.tendons), model=model)
+    shape: Shape = thing.shape if isinstance(thing, Inverse) else thing
+    return shape
+
+
+def _animate(robot: Robot, pulls: list[float] | None, model: str, path: str, frames: int) -> None:
+    from tdcr._animate import animate_pull, check_gif, pulled_shapes
+    from tdcr._progress import told
+
+    if pulls is None:
+        raise click.UsageError("--animate: expected --pull too")
+    check_gif(path)
+    # Checked as a whole before the first step.
+    tdcr.forward(robot, pulls, model=model)
+    with told(own.progress(), "plot", 2 * frames) as tell:
+        shapes = pulled_shapes(robot, np.array(pulls), model=model, count=frames, progress=tell)
+        shown = None if tell is None else (lambda done: tell(frames + done))
+        animate_pull(shapes, path, progress=shown)

@@ -1,0 +1,266 @@
+"""What commands share: options, numbers, outcomes, files."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from collections.abc import Callable, Iterable
+from math import inf, isfinite, nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from tdcr.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tdcr import Shape
+
+__all__ = [
+    "ROBOT",
+    "checked_picture",
+    "displacements_option",
+    "in_metres",
+    "json_option",
+    "model_option",
+    "numbers",
+    "output_option",
+    "picture",
+    "picture_option",
+    "points",
+    "printed",
+    "progress",
+    "rows_said",
+    "said",
+    "target_option",
+    "unit_option",
+    "writable",
+    "written",
+]
+
+_WORDS = {"inf": inf, "+inf": inf, "free": inf, "nan": nan}
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+ROBOT: Callable[[Command], Command] = click.argument("robot", type=click.Path(path_type=Path))
+
+
+def numbers(
+    context: click.Context, parameter: click.Parameter, text: str | None
+) -> list[float] | None:
+    """Read numbers with commas or spaces between them."""
+    if text is None:
+        return None
+    found = []
+    for word in text.replace(",", " ").split():
+        try:
+            number = _WORDS[word.lower()] if word.lower() in _WORDS else float(word)
+        except ValueError:
+            number = -inf
+        if number in (inf, -inf) and word.lower() not in _WORDS:
+            raise click.BadParameter(f"expected finite numbers, inf or free, got {word!r}")
+        found.append(number)
+    return found
+
+
+def displacements_option(required: bool = True) -> Callable[[Command], Command]:
+    """Option for displacements, under the same names in every command."""
+    return click.option(
+        "-d",
+        "--displacements",
+        "--pull",
+        "displacements",
+        callback=numbers,
+        metavar="NUMBERS",
+        required=required,
+        help="Change of length of each tendon, with commas or spaces between them: negative pulls, "
+        "0 holds, inf or free leaves the tendon idle.",
+    )
+
+
+def model_option(*models: str) -> Callable[[Command], Command]:
+    """Option for the model; what it is not the library says."""
+    *first, last = models
+    return click.option(
+        "--model",
+        default="rod",
+        show_default=True,
+        help=f"How shapes are found: {', '.join(first)} or {last}.",
+    )
+
+
+def unit_option(what: str) -> Callable[[Command], Command]:
+    """Option for the unit of input and tables."""
+    return click.option(
+        "--unit",
+        type=click.Choice(["m", "mm"]),
+        default="m",
+        show_default=True,
+        help=f"Unit of {what} and of the table.",
+    )
+
+
+def target_option(command: Command) -> Command:
+    """Option for the unit of a file of points."""
+    return click.option(
+        "--unit",
+        type=click.Choice(["m", "mm"]),
+        help="Unit of the file, of other lengths and of the table. Default: what the names of the "
+        'file\'s columns say, as "x [mm]" does.',
+    )(command)
+
+
+def writable(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
+    """Refuse a file that cannot be written before a long solve, not after it."""
+    if path in (None, "-"):
+        return path
+    folder, fault = Path(str(path)).parent, 0
+    if Path(str(path)).is_dir():
+        fault = errno.EISDIR
+    elif not folder.exists():
+        fault = errno.ENOENT
+    elif not folder.is_dir():
+        fault = errno.ENOTDIR
+    elif not os.access(folder, os.W_OK):
+        fault = errno.EACCES
+    if fault:
+        raise OSError(fault, os.strerror(fault), str(path))
+    return path
+
+
+def json_option(command: Command) -> Command:
+    """Option for JSON, on stdout or into a file."""
+    return click.option(
+        "--json",
+        "json_file",
+        callback=writable,
+        is_flag=False,
+        flag_value="-",
+        metavar="[FILE]",
+        help="Write the result as JSON (SI units) to FILE; without one, or for -, to stdout "
+        "instead of the table.",
+    )(command)
+
+
+def picture_option(command: Command) -> Command:
+    """Option for a picture."""
+    return click.option(
+        "--plot",
+        "plot_file",
+        callback=writable,
+        metavar="FILE",
+        help="Write a picture: .png, .pdf, .svg, ...",
+    )(command)
+
+
+def output_option(what: str, *endings: str) -> Callable[[Command], Command]:
+    """Option for the file of a result, whose ending is checked before anything is solved."""
+
+    def check(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
+        writable(context, parameter, path)
+        if path is not None and os.path.splitext(path)[1].lower() not in endings:
+            *first, last = endings
+            expected = f"{', '.join(first)} or {last}" if first else last
+            raise click.BadParameter(f"expected a file ending in {expected}, got {path!r}")
+        if path is not None and path.lower().endswith(".parquet"):
+            from tdcr._tables import require_pyarrow
+
+            require_pyarrow()
+        return path
+
+    return click.option(
+        "-o",
+        "--output",
+        callback=check,
+        metavar="FILE",
+        help=f"Save {what}: {', '.join(endings)}.",
+    )
+
+
+def in_metres(values: Iterable[float], unit: str) -> list[float]:
+    """Convert lengths, those of a file in mm exactly; what is not finite stays."""
+    if unit == "m":
+        return list(values)
+    from tdcr._file_schema import metres
+
+    return [metres(value) if isfinite(value) else value for value in values]
+
+
+def progress() -> bool:
+    """Whether to draw a progress bar: on a terminal alone."""
+    return sys.stderr.isatty()
+
+
+def checked_picture(path: str | None) -> None:
+    """Refuse a picture that cannot be written, before anything is solved."""
+    if path is not None:
+        from tdcr._plot import check_picture
+
+        check_picture(path)
+
+
+def written(path: str | None, save: Callable[[str], object]) -> None:
+    """Save to a path, if there is one."""
+    if path is not None:
+        save(path)
+
+
+def printed(json_file: str | None, text: Callable[[], str], table: Callable[[], None]) -> None:
+    """Write JSON where it is wanted, and print the table unless JSON takes its place."""
+    if json_file == "-":
+        click.echo(text())
+        return
+    table()
+    if json_file is not None:
+        Path(json_file).write_text(text() + "\n", encoding="utf-8")
+
+
+def picture(shape: Shape, path: str | None, marks: NDArray[Any] | None = None) -> None:
+    """Write the picture of a shape, with places marked."""
+    if path is not None:
+        from tdcr._plot import save_picture
+
+        save_picture(shape, path, marks=marks)
+
+
+def said(ok: bool, name: str | None, status: str, message: str) -> int:
+    """Exit code of an outcome; what did not converge is said on stderr, in one line."""
+    if ok:
+        return 0
+    text = " ".join(message.split())
+    before = f"{name}: " if name else ""
+    click.echo(f"tdcr: {before}{status}: {text}", err=True)
+    return 1
+
+
+def rows_said(result: Any) -> int:
+    """Exit code of many rows: 1 if any did not converge, and how many did what."""
+    from collections import Counter
+
+    counts = Counter(str(status) for status in result.status)
+    total, fine = len(result), counts.pop("converged", 0)
+    if fine == total:
+        return 0
+    names = ", ".join(f"{count} {status}" for status, count in counts.most_common())
+    click.echo(f"tdcr: {total - fine} of {total} rows did not converge: {names}", err=True)
+    return 1
+
+
+def points(path: Path, unit: str | None) -> tuple[Any, str]:
+    """Points of a CSV file [m], and the unit that other lengths are in: m or mm."""
+    from tdcr._read_table import read_points
+
+    try:
+        found, used = read_points(path, unit)
+    except InvalidInput as error:
+        if error.argument == "unit" and unit is None:
+            message = f"{path}: expected a unit: name the columns 'x [mm]', or add --unit mm"
+            raise InvalidInput(message, "unit") from None
+        raise
+    if used not in ("m", "mm"):
+        # Pulls and bounds have no other unit here, and a guess may be wrong by a factor of ten.
+        raise InvalidInput(f"{path}: unit: expected columns in m or mm, got {used!r}", "unit")
+    return found, used

@@ -1,0 +1,110 @@
+"""``tdcr workspace``."""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+
+import click
+
+import tdcr
+from tdcr import Robot
+from tdcr._cli import _shared as own
+
+__all__ = ["workspace"]
+
+
+def _ranges(
+    context: click.Context, parameter: click.Parameter, text: str
+) -> list[tuple[float, float]]:
+    """Read ranges: LOW:HIGH, a number, or free."""
+    found = []
+    for word in text.replace(",", " ").split():
+        ends = word.split(":")
+        read = own.numbers(context, parameter, " ".join(ends)) or []
+        if not (len(ends) == len(read) == 2 or len(ends) == len(read) == 1):
+            raise click.BadParameter(f"expected LOW:HIGH, a number or free, got {word!r}")
+        found.append((read[0], read[-1]))
+    if not found:
+        raise click.BadParameter("expected LOW:HIGH, a number or free, got nothing")
+    return found
+
+
+@click.command(
+    "workspace",
+    epilog='\b\nExample:\n  tdcr workspace trunk.toml --ranges "-20:0 -20:0 free" --unit mm '
+    "--samples 20000 --plot reach.png",
+)
+@own.ROBOT
+@click.option(
+    "--ranges",
+    callback=_ranges,
+    required=True,
+    metavar="RANGES",
+    help="Of each tendon LOW:HIGH, a number that keeps it there, or free; with commas or spaces "
+    "between them. A single one is for all tendons.",
+)
+@click.option("--samples", type=int, default=10_000, show_default=True, help="Rows to solve.")
+@click.option(
+    "--sampling",
+    type=click.Choice(["sobol", "grid", "random"]),
+    default="sobol",
+    show_default=True,
+    help="How displacements are drawn; sobol needs scipy.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of sobol and random.")
+@own.model_option("rod", "linkage", "constant_curvature")
+@own.unit_option("the ranges")
+@own.json_option
+@own.picture_option
+@click.option(
+    "--view",
+    type=click.Choice(["section", "3d"]),
+    default="section",
+    show_default=True,
+    help="Of the picture.",
+)
+@own.output_option("the samples", ".npz", ".json", ".csv", ".parquet")
+def workspace(
+    robot: Path,
+    ranges: list[tuple[float, float]],
+    samples: int,
+    sampling: str,
+    seed: int,
+    model: str,
+    unit: str,
+    json_file: str | None,
+    plot_file: str | None,
+    view: str,
+    output: str | None,
+) -> int:
+    """Sample where the tip of the robot in file ROBOT gets."""
+    from tdcr import _report_results as report
+
+    own.checked_picture(plot_file)
+    arm = Robot.load(robot)
+    if len(ranges) == 1:
+        ranges = ranges * len(arm.tendons)
+    limits = [tuple(own.in_metres(pair, unit)) for pair in ranges]
+    if all(pair == (inf, inf) for pair in limits):
+        raise click.BadParameter("expected a tendon that is not free", param_hint="--ranges")
+    found = tdcr.workspace(
+        arm,
+        limits,
+        samples,
+        sampling=sampling,  # type: ignore[arg-type]
+        seed=seed,
+        model=model,
+        progress=own.progress(),
+    )
+    own.printed(
+        json_file,
+        lambda: report.workspace_json(found),
+        lambda: report.print_workspace(found, unit),
+    )
+    own.written(output, found.save)
+    if plot_file is not None:
+        from tdcr._plot_workspace import save_workspace
+
+        save_workspace(found, plot_file, view=view)
+    return own.rows_said(found)
