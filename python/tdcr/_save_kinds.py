@@ -100,6 +100,9 @@ _INVERSE: dict[str, Callable[[Record, str], Any]] = {
     "method": lambda r, name: r.text(name, "newton", "pso"),
     "target": lambda r, name: _places(r, name),
     "targets": lambda r, name: _places(r, name),
+    "obstacles": Record.things,
+    "loads": lambda r, name: r.optional(name, ("Loads",)),
+    "known_shape": lambda r, name: _shape_within(r, name),
 }
 
 
@@ -117,6 +120,16 @@ def _places(record: Record, name: str) -> Any:
     return record.array(name, *_rows(record), *((4, 4) if first == 2 else (3,)))
 
 
+def _shape_within(record: Record, name: str) -> Any:
+    """A shape as a field, or None."""
+    value = record.get(name)
+    if value is None:
+        return None
+    if not isinstance(value, dict) or value.get("kind") != "Shape":
+        raise record.fault(name, "expected the fields of a Shape")
+    return _shape_read(Record(f"{record.path}: {name}", value))
+
+
 def _statuses(record: Record, name: str) -> Any:
     words = record.array(name, "B", dtype=np.str_)
     try:
@@ -128,8 +141,14 @@ def _statuses(record: Record, name: str) -> Any:
 
 
 def _value_said(result: Any) -> dict[str, Any]:
-    names = [field.name for field in fields(result)]
-    return {name: described(getattr(result, name), name) for name in names}
+    said = {}
+    for field in fields(result):
+        value = getattr(result, field.name)
+        if isinstance(value, _core.Shape):
+            said[field.name] = {"kind": "Shape", **_shape_said(value)}
+        else:
+            said[field.name] = described(value, field.name)
+    return said
 
 
 def _inverse_read(kind: Any) -> Callable[[Record], Any]:
