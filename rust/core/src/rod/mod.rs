@@ -3,7 +3,7 @@
 mod ascent;
 mod chain;
 pub mod contact;
-mod element;
+pub(crate) mod element;
 pub(crate) mod march;
 mod message;
 mod model;
