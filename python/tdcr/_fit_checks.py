@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["checked", "far_off", "whole"]
 
 # Root mean square distances from which a fit is no description of what was measured: as a share of
-# the robot's length (calibrated models of a measured robot leave 2 to 4 %), and in medians (normal noise
-# has 1.1 of them).
+# the robot's length (calibrated models of a measured one leave 2 to 4 %), and in medians (normal
+# noise has 1.1 of them).
 _SHARE, _MEDIANS = 0.05, 10
 
 
