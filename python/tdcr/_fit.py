@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 import numpy as np
 
 from tdcr._core import Robot
-from tdcr._fit_model import NAMES, Measured, Problem
+from tdcr._fit_checks import checked, far_off, whole
 from tdcr._measurements import Measurements
 from tdcr._status import Status
 from tdcr._value import Value
@@ -18,7 +18,8 @@ from tdcr.errors import InvalidInput, NotConverged
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tdcr._core import ConstantCurvatureSettings, RodSettings
+    from tdcr._core import ConstantCurvatureSettings, Robot, RodSettings
+    from tdcr._fit_model import Measured, Problem
 
     Array: TypeAlias = NDArray[np.float64]
     Part: TypeAlias = Literal["train", "validation"]
@@ -62,6 +63,9 @@ class Fit(Value):
     status: Status
     """converged, or iteration_limit."""
     message: str
+    """Whether steps still fell; whether the root mean square distance of the points fitted to is
+    more than 10 times their median, which outliers make, or more than 5 % of the robot's length:
+    then the model is not of these measurements. Empty if none of these."""
     iterations: int
     """Levenberg-Marquardt steps."""
     seed: int
@@ -194,16 +198,17 @@ def fit(
     Raises
     ------
     InvalidInput
-        Arrays of another shape, infinite measurements, no row without gaps, fewer numbers than
-        unknowns, a parameter that is unknown, repeated or not one of the model's.
+        Arrays of another shape, no rows, infinite measurements, no row without gaps, fewer numbers
+        than unknowns, a parameter that is unknown, repeated or not one of the model's.
+    TypeError
+        A value of another type.
     """
-    if max_iterations < 1:
-        message = f"max_iterations: expected at least 1, got {max_iterations}"
-        raise InvalidInput(message, "max_iterations")
     displacements, measurements = _paired(displacements, measurements)
-    problem, measured = _checked(
+    problem, measured = checked(
         robot, displacements, measurements, parameters, model, settings, validation
     )
+    max_iterations = whole("max_iterations", max_iterations, 1)
+    seed = whole("seed", seed, 0)
     count = len(measured.points)
     held = np.zeros(count, dtype=bool)
     order = np.random.default_rng(seed).permutation(count)
@@ -229,6 +234,8 @@ def fit(
     errors = _standard_errors(problem, train, values, scale)
     after, solved = problem.residuals(values, measured)
     status = Status.converged if done else Status.iteration_limit
+    parts = [] if done else [f"still falling after {iterations} iterations"]
+    parts += far_off(np.linalg.norm(after[~held], axis=2), robot.backbone.total_length)
     for array in (after, before, measured.rows, held):
         array.flags.writeable = False
     return Fit(
@@ -242,7 +249,7 @@ def fit(
         dropped=measured.dropped,
         failed=int(np.count_nonzero(~solved)),
         status=status,
-        message="" if done else f"still falling after {iterations} iterations",
+        message="; ".join(parts),
         iterations=iterations,
         seed=seed,
     )
@@ -260,42 +267,6 @@ def _paired(
     if displacements is None:
         raise TypeError("displacements: expected an array, or Measurements as measurements")
     return displacements, measurements
-
-
-def _checked(
-    robot: Robot,
-    displacements: ArrayLike,
-    measurements: ArrayLike,
-    parameters: Sequence[str],
-    model: str,
-    settings: Any,
-    validation: float,
-) -> tuple[Problem, Measured]:
-    if not isinstance(robot, Robot):
-        raise TypeError(f"robot: expected Robot, got {type(robot).__name__}")
-    if model not in ("rod", "constant_curvature"):
-        message = f'model: expected "rod" or "constant_curvature", got {model!r}'
-        raise InvalidInput(message, "model")
-    if not 0 <= validation <= 0.9:
-        message = f"validation: expected a share in [0, 0.9], got {validation!r}"
-        raise InvalidInput(message, "validation")
-    names = [parameters] if isinstance(parameters, str) else list(parameters)
-    known = [n for n in NAMES if model == "rod" or n not in ("stiffness", "poisson_ratio", "rest")]
-    if not names or len(set(names)) < len(names) or not set(names) <= set(known):
-        message = f"parameters: expected some of {known} for model {model!r}, each once"
-        raise InvalidInput(f"{message}, got {names}", "parameters")
-    for k, tendon in enumerate(robot.tendons):
-        plain = tendon.routing == "angles"
-        straight = plain and np.ndim(tendon.azimuth) == 0 and np.ndim(tendon.radius) == 0
-        if not straight and {"radius", "azimuth"} & set(names):
-            message = f"parameters: expected straight tendons to fit holes of, got tendons[{k}]"
-            raise InvalidInput(message, "parameters")
-        if tendon.stiffness is None and "stiffness" in names:
-            message = "parameters: expected tendons with a stiffness [N] to fit it"
-            raise InvalidInput(f"{message}, got tendons[{k}] without one", "parameters")
-    return Problem(robot, names, model, settings), Measured.checked(
-        robot, displacements, measurements
-    )
 
 
 def _weights(residuals: Array, solved: NDArray[np.bool_], scale: float) -> tuple[Array, float]:

@@ -42,6 +42,9 @@ class Measured:
             message = f"displacements: expected shape (B, {tendons}), got shape {pulls.shape}"
             raise InvalidInput(message, "displacements")
         rows = len(pulls)
+        if rows == 0:
+            message = "measurements: expected at least one row, got none"
+            raise InvalidInput(message, "measurements")
         if points.shape not in ((rows, 3), (rows, disks, 3)):
             raise InvalidInput(
                 f"measurements: expected one row per displacement, shape ({rows}, 3) or "

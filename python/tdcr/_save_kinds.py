@@ -121,7 +121,7 @@ def _places(record: Record, name: str) -> Any:
 
 
 def _shape_within(record: Record, name: str) -> Any:
-    """A shape as a field, or None."""
+    """Give a shape that is a field, or None."""
     value = record.get(name)
     if value is None:
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -23,6 +24,8 @@ __all__ = ["on_curve", "wanted_places"]
 # A curve given as a function is sampled so often per subsegment, and so far beyond the robot's
 # length: arcs and chords need more of a curve than their own length where it bends.
 _SAMPLES, _BEYOND = 20, 1.25
+# Angle off the base's z axis from which it is said that disks will swing about a curve [deg].
+_ASIDE = 10
 
 
 def on_curve(robot: Robot, points: ArrayLike, subsegment: str = "arc") -> Array:
@@ -47,9 +50,23 @@ def on_curve(robot: Robot, points: ArrayLike, subsegment: str = "arc") -> Array:
     Raises
     ------
     InvalidInput
-        Points of another shape, fewer than two, not finite or repeated, a curve that is too short.
+        Points of another shape, fewer than two, not finite or repeated, a curve that is too short
+        or leaves the base by 90 degrees or more off its z axis.
+
+    Warns
+    -----
+    RuntimeWarning
+        A curve that leaves the base by more than 10 degrees off its z axis: the places are on it,
+        but subsegments bend to one side and the other between them.
     """
-    return _core._points_on_curve(robot, points, subsegment)
+    places, angle = _core._points_on_curve(robot, points, subsegment)
+    if np.degrees(angle) > _ASIDE:
+        message = (
+            f"the curve leaves the base {np.degrees(angle):.1f} deg off its z axis, along which "
+            f"the robot leaves: subsegments will swing about it; turn the curve or the robot's base"
+        )
+        warnings.warn(message, RuntimeWarning, stacklevel=2)
+    return places
 
 
 def wanted_places(robot: Robot, given: ArrayLike | Curve, subsegment: str) -> Array:

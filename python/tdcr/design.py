@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -27,8 +28,6 @@ from tdcr._wanted import on_curve, wanted_places
 from tdcr.errors import NotConverged
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import ArrayLike
 
     from tdcr._core import Shape
@@ -68,7 +67,8 @@ class Prebend(Value):
     the nearest robot that was found, or obstacles stand in the way; others: the rod does not follow
     the displacements."""
     message: str
-    """What stood in the way; empty when it converged."""
+    """What stood in the way; when it converged, empty but for obstacles that the designed robot
+    rests in and what the solve among them says of the way."""
     target_positions: Array
     """Wanted places of disks 1 to n, (n, 3), world frame [m]."""
     settings: PrebendSettings
@@ -113,6 +113,11 @@ def prebend(
     Obstacles do not change the rest shape that is sought: wanted places clear of them are an
     equilibrium without contact, and no rest shape has places inside them. What they change is the
     way there: `shape` is then pulled from rest among them, and "converged" says that it arrives.
+    Where it rests inside one, the message says where and how deep.
+
+    Places that no rest shape reaches are sought from several starts: the least distances that rods
+    of these lengths can have, whatever bends them, are found first, and descents with the tendons
+    go on from there.
 
     Parameters
     ----------
@@ -139,9 +144,10 @@ def prebend(
     Raises
     ------
     InvalidInput
-        Places of another shape or number, not finite, or whose first of n + 1 is not the base; a
-        curve that is too short; displacements that do not fit the robot; proportional tendons among
-        obstacles.
+        Places of another shape or number, not finite, more than a million lengths of the robot
+        away, or whose first of n + 1 is not the base; a curve that is too short or leaves the base
+        by 90 degrees or more off its z axis; displacements that do not fit the robot; proportional
+        tendons among obstacles.
     TypeError
         A value of another type.
     KeyboardInterrupt
@@ -152,11 +158,22 @@ def prebend(
         if not isinstance(value, kind):
             got = type(value).__name__
             raise TypeError(f"{name}: expected {kind.__name__}, got {got}")
+    around = _sequence(obstacles)
     places = wanted_places(robot, target_positions, settings.rod.subsegment)
     fields = _core._prebend(robot, places, displacements, settings)
     answer = Prebend(*fields, places, settings)
-    around = (obstacles,) if isinstance(obstacles, Obstacle) else tuple(obstacles)
     return _among(answer, around) if around else answer
+
+
+def _sequence(obstacles: Obstacle | Iterable[Obstacle]) -> tuple[Obstacle, ...]:
+    """One obstacle or several as several."""
+    if isinstance(obstacles, Obstacle):
+        return (obstacles,)
+    if not isinstance(obstacles, Iterable):
+        got = type(obstacles).__name__
+        message = f"obstacles: expected an obstacle or a sequence of obstacles, got {got}"
+        raise TypeError(message)
+    return tuple(obstacles)
 
 
 def _among(free: Prebend, obstacles: tuple[Obstacle, ...]) -> Prebend:
@@ -173,6 +190,9 @@ def _among(free: Prebend, obstacles: tuple[Obstacle, ...]) -> Prebend:
     error.flags.writeable = False
     gap, where = _gap(free.shape, obstacles, rod.body_radius)
     met = error.max() <= free.settings.tolerance * length
+    # The solve pulls it out of what it rests in; who builds it has to know.
+    rest = forward(free.robot, np.full(len(pulls), np.inf), settings=rod)
+    sunk, at = _gap(rest, obstacles, rod.body_radius)
     # Gaps within rounding touch.
     deep = gap < -_TOUCH * length
     status, parts = Status.converged, []
@@ -191,7 +211,12 @@ def _among(free: Prebend, obstacles: tuple[Obstacle, ...]) -> Prebend:
             f"them, but not the one that pulling from rest leads to: disk {disk} stays "
             f"{error[disk]:.3e} m from its place"
         ]
-    if status is not Status.converged and shape.message:
+    if sunk < -_TOUCH * length:
+        parts.append(
+            f"the designed robot rests {-sunk:.3e} m inside obstacles at {at}: they have to be put "
+            f"in their places after it is pulled"
+        )
+    if shape.message:
         parts.append(f"among the obstacles, {shape.message}")
     message = "; ".join(parts)
     return replace(

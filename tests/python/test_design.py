@@ -106,7 +106,9 @@ def test_bounds_smoothness_and_other_rods_are_met_by_descent():
     held = design.prebend(finger(), places, pulls, settings=tdcr.PrebendSettings(max_bend=bound))
     assert held.status == "unreachable"
     assert np.linalg.norm(held.robot.backbone.rest, axis=1).max() <= bound * (1 + 1e-12)
-    assert 1e-4 < held.error.max() < 0.05
+    # Bends that swing about the curve make up for much of the bound, also out of the plane.
+    assert 1e-6 < held.error.max() < 1e-4
+    assert "at max_bend" in held.message
     smooth = design.prebend(finger(), places, pulls, settings=tdcr.PrebendSettings(smoothness=0.1))
     assert smooth.ok
     roughness = [np.diff(a.robot.backbone.rest, axis=0).std() for a in (free, smooth)]
@@ -139,6 +141,70 @@ def test_what_cannot_be_reached_is_said():
     assert "180.0 deg off the base's z axis" in backwards.message
 
 
+def bar():
+    return tdcr.Robot(tdcr.Backbone(LENGTH, 9), [tdcr.Tendon(np.pi, 0.008)])
+
+
+def arc():
+    turn = np.linspace(0, 2, 50)[:, None]
+    points = 0.1 * np.hstack([1 - np.cos(turn), 0 * turn, np.sin(turn)])
+    return design.on_curve(bar(), points)
+
+
+def about_y(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+
+
+AHEAD = np.outer(np.arange(1, 10) * 0.02, [0, 0, 1])
+
+
+@pytest.mark.parametrize(
+    ("places", "best"),
+    [
+        (arc() * [1, 1, -1], 14.831e-3),
+        (0.8 * AHEAD, 2.3442e-3),
+        (0.5 * AHEAD @ about_y(1.2), 7.106e-3),
+        (arc() @ about_y(-2.0), 6.8983e-3),
+        (np.add(arc(), [0, 0, 0.03]), 24.3031e-3),
+    ],
+    ids=["backwards", "too short", "short and sideways", "sideways", "lifted"],
+)
+def test_places_out_of_reach_are_come_near(places, best):
+    """The least root mean square of scipy's least_squares from 40 random rest shapes [m]."""
+    answer = design.prebend(bar(), places, [-0.005])
+    assert answer.status == "unreachable"
+    assert answer.shape.ok
+    assert np.sqrt((answer.error[1:] ** 2).mean()) < 1.01 * best
+    assert "from disk 0 to disk 1" in answer.message
+
+
+def test_chords_are_blamed_only_for_what_they_explain():
+    """Chords off by 0.01 % take disks 18 um away, not millimetres."""
+    pulls, settings = [-0.005], design.PrebendSettings(max_bend=0.22)
+    answer = design.prebend(bar(), arc() * 1.0001, pulls, settings=settings)
+    assert answer.status == "unreachable"
+    assert answer.error.max() > 1e-3
+    assert "from disk 0 to" not in answer.message
+    assert "9 rest bends, from disk 0 the first, are at max_bend, 0.220000 rad" in answer.message
+    free = design.prebend(bar(), arc() * 1.0001, pulls)
+    assert free.error.max() < 1e-4
+    assert "from disk 0 to disk 1" in free.message
+
+
+@pytest.mark.parametrize("subsegment", ["arc", "link"])
+def test_curves_that_leave_the_base_sideways_are_told(subsegment):
+    line = 0.2 * np.linspace(0, 1, 30)[:, None] * [0, 0, 1]
+    for angle in (90, 120, 180):
+        with pytest.raises(tdcr.InvalidInput, match=rf"z axis.*leaves {angle}.0 deg off") as caught:
+            design.on_curve(bar(), line @ about_y(np.radians(angle)), subsegment)
+        assert caught.value.argument == "points"
+    with pytest.warns(RuntimeWarning, match="leaves the base 45.0 deg off its z axis"):
+        design.on_curve(bar(), line @ about_y(np.radians(45)), subsegment)
+    with pytest.raises(tdcr.InvalidInput, match="target_positions: of the curve's points, "):
+        design.prebend(bar(), lambda s: [s, 0.0, 0.0], [-0.005])
+
+
 def test_results_are_values():
     answer = design.prebend(finger(), design.on_curve(finger(), sphere_curve(0.064)), [-0.004])
     for other in (copy.deepcopy(answer), pickle.loads(pickle.dumps(answer))):
@@ -160,6 +226,8 @@ BAD = [
     ("target_positions", NINE[:, :2], [-0.004]),
     ("target_positions", [[0.0], [0.0, 1.0]], [-0.004]),
     ("target_positions", np.full((9, 3), np.nan), [-0.004]),
+    ("target_positions", np.full((9, 3), 1e200), [-0.004]),
+    ("target_positions", np.full((9, 3), -1e7), [-0.004]),
     ("target_positions[0]", np.zeros((10, 3)), [-0.004]),
     ("target_positions[0]", np.full((10, 3), np.nan), [-0.004]),
     ("target_positions", lambda s: [s, 0.0], [-0.004]),

@@ -28,6 +28,7 @@ def test_clear_of_obstacles_the_answer_is_the_same():
     ball = tdcr.Sphere([0.1, 0.0, 0.0], 0.05)
     answer = design.prebend(straight(), circle(), PULL, obstacles=ball).require()
     assert answer.robot == free.robot
+    assert "rests 6.223e-03 m inside obstacles at opposite the hole of 't0'" in answer.message
     assert answer.shape.obstacles == (ball,)
     assert not answer.shape.contacts
     assert answer.error.max() < 1e-10 * LENGTH
@@ -82,7 +83,25 @@ def test_places_out_of_reach_stay_so_among_obstacles():
     assert "stays 4.406e-3 m" in answer.message
 
 
+def test_obstacles_that_the_designed_robot_rests_in_are_told():
+    free = design.prebend(straight(), circle(), PULL).require()
+    rest = tdcr.forward(free.robot, [np.inf]).positions
+    answer = design.prebend(
+        straight(), circle(), PULL, obstacles=tdcr.Sphere(rest[9], 0.012)
+    ).require()
+    assert "rests 1.200e-02 m inside obstacles at the centre of disk 9" in answer.message
+    assert answer.shape.message in answer.message
+    # Clear of it at rest and when pulled, there is nothing to tell.
+    clear = design.prebend(straight(), circle(), PULL, obstacles=tdcr.Sphere([-0.2, 0, 0], 0.05))
+    assert clear.require().message == ""
+
+
 def test_bad_obstacles():
+    with pytest.raises(
+        tdcr.InvalidInput, match="expected an obstacle or a sequence of obstacles, got int"
+    ) as caught:
+        design.prebend(straight(), circle(), PULL, obstacles=3)
+    assert caught.value.argument == "obstacles"
     with pytest.raises(TypeError, match=r"expected .*got "):
         design.prebend(straight(), circle(), PULL, obstacles=["ball"])
     settings = design.PrebendSettings(rod=tdcr.RodSettings(tendons="proportional"), tolerance=1e-2)

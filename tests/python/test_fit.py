@@ -204,6 +204,23 @@ def test_derivatives_are_those_of_the_predictions(points):
         assert jacobian[p] == pytest.approx(slope, rel=1e-5, abs=1e-6 * problem.scales[p]), p
 
 
+def test_what_a_fit_leaves_is_judged():
+    given = pulls(trunk(), 9)
+    measured = noisy(positions(trunk(radii=(0.0095, 0.0112)), given))[:, -1]
+    names = ["radius", "azimuth"]
+    good = design.fit(trunk(), measured, names, displacements=given).require()
+    assert good.message == ""
+    # In millimetres, and with two axes for each other.
+    for wrong, share in ((1e3 * measured, 500), (measured[:, [2, 1, 0]], 0.05)):
+        bad = design.fit(trunk(), wrong, names, displacements=given)
+        rms = bad.rms("train")
+        assert rms > share * 0.2
+        assert f"the fitted robot stays {rms:.3e} m off, root mean square, " in bad.message
+    measured[:6] += 0.02
+    some = design.fit(trunk(), measured, names, displacements=given, validation=0).require()
+    assert "6 of 60 points are more than 10 times as far off as the median" in some.message
+
+
 def test_gaps_are_dropped_and_counted():
     given = pulls(trunk(), 7)
     measured = positions(trunk(), given)[:, -1].copy()
@@ -245,10 +262,15 @@ BAD = [
     ("measurements", {"measurements": np.full((5, 3), np.nan)}),
     ("measurements", {"measurements": np.full((5, 3), np.inf)}),
     ("measurements", {"measurements": [[0.0], [0.0, 1.0]]}),
+    ("measurements", {"measurements": TIPS[:0], "displacements": GIVEN[:0]}),
+    ("measurements", {"measurements": np.zeros((0, 9, 3)), "displacements": GIVEN[:0]}),
     ("measurements", {"measurements": TIPS[:1], "displacements": GIVEN[:1]}),
     ("displacements", {"displacements": GIVEN[:, :1]}),
     ("displacements", {"displacements": GIVEN[0]}),
     ("parameters", {"parameters": []}),
+    ("parameters", {"parameters": 3}),
+    ("parameters", {"parameters": [["gain"]]}),
+    ("seed", {"seed": -1}),
     ("parameters", {"parameters": ["gain", "gain"]}),
     ("parameters", {"parameters": ["stiffness"]}),
     ("parameters", {"parameters": ["rest"], "model": "constant_curvature"}),
@@ -274,6 +296,9 @@ def test_holes_of_winding_tendons_and_wrong_types():
         design.fit(winding(), TIPS, ["radius"], displacements=one)
     with pytest.raises(TypeError, match="measurements: expected numbers"):
         design.fit(winding(), [["a"] * 3] * 5, ["gain"], displacements=one)
+    for name, value in (("validation", "all"), ("seed", 0.5), ("max_iterations", "many")):
+        with pytest.raises(TypeError, match=rf"{name}: expected .*got "):
+            design.fit(trunk(), TIPS, ["gain"], displacements=GIVEN, **{name: value})
     with pytest.raises(TypeError, match="robot: expected Robot"):
         design.fit("robot", TIPS, ["gain"], displacements=one)
 

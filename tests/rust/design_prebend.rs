@@ -204,6 +204,22 @@ fn what_cannot_be_reached_is_said() {
 }
 
 #[test]
+fn places_nearer_than_the_rod_is_long_are_folded_to() {
+    let spec = BackboneSpec::straight(0.18, 9);
+    let tendon = Tendon::straight(PI, 8e-3).unwrap();
+    let robot = Robot::new(Backbone::new(spec).unwrap(), vec![tendon], None, None, None).unwrap();
+    let short: Vec<_> = (1..=9).map(|i| Vector3::new(0.0, 0.0, 0.016 * f64::from(i))).collect();
+    let answer = prebend(&robot, &short, &[-0.005], &PrebendSettings::default()).unwrap();
+    assert_eq!(answer.status, Status::Unreachable);
+    let rms = (answer.errors.iter().map(|e| e * e).sum::<f64>() / 9.0).sqrt();
+    // The least of 40 descents of scipy from random rest shapes.
+    assert!(rms < 1.01 * 2.3442e-3, "{rms}");
+    let far = vec![Vector3::new(1e200, 0.0, 0.0); 9];
+    let error = prebend(&robot, &far, &[-0.005], &PrebendSettings::default()).unwrap_err();
+    assert_eq!(error.argument, "target_positions");
+}
+
+#[test]
 fn a_flag_ends_a_design() {
     let (robot, curve) = finger(0.064);
     let targets = points_on_curve(&robot, &curve, Subsegment::Arc).unwrap();

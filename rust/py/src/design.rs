@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use tdcr::design::{self, points_on_curve, prebend_stopped_by};
+use tdcr::design::{self, angle_at_base, points_on_curve, prebend_stopped_by};
 use tdcr::rod::Subsegment;
 
 use crate::arguments::{number, whole};
@@ -35,7 +35,7 @@ use crate::shape::Shape;
 ///     Distance of every disk from its wanted place that counts as reached, in shares of the robot's length.
 ///     In (0, 1e-2].
 /// max_iterations : int, optional
-///     Levenberg-Marquardt steps at most.
+///     Levenberg-Marquardt steps of a start at most.
 ///
 /// Raises
 /// ------
@@ -121,7 +121,7 @@ impl PrebendSettings {
         self.0.tolerance
     }
 
-    /// Levenberg-Marquardt steps at most.
+    /// Levenberg-Marquardt steps of a start at most.
     #[getter]
     fn max_iterations(&self) -> usize {
         self.0.max_iterations
@@ -145,8 +145,8 @@ impl PrebendSettings {
     }
 }
 
-/// Changes of disks by rest bends, of about a microsecond each, up to which a design ends soon enough to go
-/// without listening for Ctrl-C.
+/// Products of small matrices in a descent, of about a microsecond each with all its starts, up to which a design
+/// ends soon enough to go without listening for Ctrl-C.
 const SOON: usize = 100_000;
 
 /// Robot, shape, errors, iterations, status and message of a design.
@@ -163,7 +163,7 @@ pub(crate) fn _prebend<'py>(
     let (core, settings) = (&robot.get().0, settings.get().0);
     let solve =
         |stop: &Arc<AtomicBool>| prebend_stopped_by(core, &targets, &pulls, &settings, stop);
-    let work = targets.len().pow(2) * settings.rod.elements;
+    let work = targets.len().pow(3) * settings.rod.elements;
     let answer = if work.saturating_mul(settings.max_iterations) <= SOON {
         py.detach(|| solve(&Arc::default()))
     } else {
@@ -184,17 +184,21 @@ pub(crate) fn _prebend<'py>(
     PyTuple::new(py, fields)
 }
 
-/// Places on a curve that disks 1 to n can have.
+/// Places on a curve that disks 1 to n can have, and the angle at which it leaves the base's z axis [rad].
 #[pyfunction]
 pub(crate) fn _points_on_curve(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
     points: &Bound<'_, PyAny>,
     subsegment: &str,
-) -> PyResult<Py<PyAny>> {
+) -> PyResult<(Py<PyAny>, f64)> {
     let kind = named("subsegment", Subsegment::ALL, Subsegment::as_str, subsegment)?;
     let points = vectors("points", points)?;
     let core = &robot.get().0;
-    let places = py.detach(|| points_on_curve(core, &points, kind)).map_err(|e| invalid(&e))?;
-    frozen_points(py, places.into_iter())
+    let found = py.detach(|| {
+        let places = points_on_curve(core, &points, kind)?;
+        Ok((places, angle_at_base(core, &points)?))
+    });
+    let (places, angle) = found.map_err(|e| invalid(&e))?;
+    Ok((frozen_points(py, places.into_iter())?, angle))
 }

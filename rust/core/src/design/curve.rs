@@ -1,5 +1,7 @@
 //! Places on a curve that a robot's disks can have.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::Vector3;
 
 use crate::error::InvalidInput;
@@ -33,19 +35,37 @@ pub(super) fn mirrored(tangent: &Vector3<f64>, chord: &Vector3<f64>) -> Vector3<
     *tangent
 }
 
+/// Angle between the base's z axis and the spline through `points` \[m\] where it begins \[rad\].
+///
+/// # Errors
+/// `InvalidInput` for fewer than two points, points that are not finite or repeat.
+pub fn angle_at_base(robot: &Robot, points: &[Vector3<f64>]) -> Result<f64, InvalidInput> {
+    let along = Spline::checked(points)?.at_arc_length(0.0).1;
+    let axis = robot.base().rotation.column(2).into_owned();
+    Ok(axis.cross(&along).norm().atan2(axis.dot(&along)))
+}
+
 /// Wanted places of disks 1 to n on the spline through `points` \[m\], where they can be reached one after the
 /// other from the base frame: at equal chords for links; for arcs, whose tangents go over into each other, at the
 /// ends of arcs that start along the last one's end. The curve is moved to start at the base.
 ///
 /// # Errors
-/// `InvalidInput` for fewer than two points, points that are not finite or repeat, or a curve shorter than the
-/// robot.
+/// `InvalidInput` for fewer than two points, points that are not finite or repeat, a curve that leaves the base
+/// across its z axis or backwards, or one that is shorter than the robot.
 pub fn points_on_curve(
     robot: &Robot,
     points: &[Vector3<f64>],
     kind: Subsegment,
 ) -> Result<Vec<Vector3<f64>>, InvalidInput> {
     let spline = Spline::checked(points)?;
+    let angle = angle_at_base(robot, points)?;
+    // Then the first subsegment would have to bend by half a turn or more.
+    if angle > FRAC_PI_2 * (1.0 - 1e-9) {
+        let expected =
+            "a curve that leaves along the base's z axis, as the robot does: turn one of them";
+        let got = format!("one that leaves {:.1} deg off it", angle.to_degrees());
+        return Err(InvalidInput::new("points", expected, got));
+    }
     let base: &Pose = robot.base();
     let shift = base.translation - points[0];
     let mut tangent = base.rotation.column(2).into_owned();

@@ -1,14 +1,19 @@
 //! Pre-bent design: the rest shape that takes a wanted shape when the tendons are pulled (Mahapatra & Ghosal
 //! 2024, section 4).
 
+use std::cmp::Ordering;
+use std::f64::consts::PI;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering as Memory};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::check_targets;
+use super::descent::{Bent, descend, within};
 use super::hindrance::hindrance;
 use super::march::march;
+use super::nearest::Chain;
+use super::settings::PrebendSettings;
 use crate::error::InvalidInput;
 use crate::model::Model;
 use crate::robot::{Backbone, Robot};
@@ -16,69 +21,10 @@ use crate::rod::{Plan, Rod, RodSettings, TendonRule, Workspace};
 use crate::shape::Shape;
 use crate::status::Status;
 
-/// What a chord may be off, in shares of its subsegment, before it is blamed.
-const OFF: f64 = 1e-9;
-
-/// Choices of a pre-bent design.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PrebendSettings {
-    /// Of the rod model that the design is for.
-    pub rod: RodSettings,
-    /// Largest bend of a subsegment at rest \[rad\].
-    pub max_bend: f64,
-    /// Weight of the differences between neighbouring rest strains, against distances over the robot's
-    /// length: 0 for none.
-    pub smoothness: f64,
-    /// Distance of every disk that counts as reached, in shares of the robot's length.
-    pub tolerance: f64,
-    /// Gauss-Newton steps at most.
-    pub max_iterations: usize,
-}
-
-impl Default for PrebendSettings {
-    fn default() -> Self {
-        Self {
-            rod: RodSettings::default(),
-            max_bend: std::f64::consts::PI,
-            smoothness: 0.0,
-            tolerance: 1e-10,
-            max_iterations: 100,
-        }
-    }
-}
-
-impl PrebendSettings {
-    /// Checks the values.
-    ///
-    /// # Errors
-    /// `InvalidInput` for a value out of range.
-    pub fn validate(&self) -> Result<(), InvalidInput> {
-        self.rod.validate()?;
-        let limits = [
-            (
-                "max_bend",
-                self.max_bend,
-                self.max_bend > 0.0 && self.max_bend <= std::f64::consts::PI,
-            ),
-            ("smoothness", self.smoothness, self.smoothness >= 0.0 && self.smoothness.is_finite()),
-            ("tolerance", self.tolerance, self.tolerance > 0.0 && self.tolerance <= 1e-2),
-        ];
-        for (name, value, fits) in limits {
-            if !fits {
-                let expected = match name {
-                    "max_bend" => "an angle in (0, pi] rad",
-                    "smoothness" => "0 or more",
-                    _ => "a share in (0, 1e-2]",
-                };
-                return Err(InvalidInput::new(name, expected, format!("{value:?}")));
-            }
-        }
-        if self.max_iterations == 0 {
-            return Err(InvalidInput::new("max_iterations", "at least 1", 0));
-        }
-        Ok(())
-    }
-}
+/// Share by which a sum of squares may be above the least before more is sought.
+const ENOUGH: f64 = 1e-6;
+/// Starts that go on by a descent.
+const REFINED: usize = 8;
 
 /// A designed robot.
 #[derive(Clone, Debug)]
@@ -101,7 +47,8 @@ pub struct Prebend {
 ///
 /// Where every subsegment can be inverted by itself (one element, sliding tendons, no bounds met) the answer is
 /// exact and its rest shape has the twists of `robot`'s; elsewhere the bends of the rest shape are found by
-/// Gauss-Newton steps on the rod's derivatives, from there or from `robot`'s own.
+/// Levenberg-Marquardt steps on the rod's derivatives, from there or from `robot`'s own, and, if that does not meet
+/// the places, from where rods of these lengths come nearest to them.
 ///
 /// # Errors
 /// `InvalidInput` for another number of targets than subsegments, places that are not finite, and
@@ -130,15 +77,21 @@ pub fn prebend_stopped_by(
     robot.check_displacements(displacements)?;
     check_targets(robot, targets)?;
     let design = Design { robot, targets, displacements, settings, stop };
-    let start = match design.marched()? {
-        Some(candidate) if design.met(&candidate) && settings.smoothness == 0.0 => {
-            return design.told(candidate);
-        }
+    let own = design.own_rest();
+    let start = match design.marched(targets)? {
         Some(candidate) => candidate,
-        None => design.solved(design.own_rest(), None, 0)?,
+        None => design.solved(own.clone(), None, 0)?,
     };
-    let refined = design.refine(start)?;
-    design.told(refined)
+    let there = design.reached(&start);
+    if there && settings.smoothness == 0.0 {
+        return Ok(design.told(start, None));
+    }
+    let first = design.pulled(design.refined(start)?)?;
+    if there || design.reached(&first) || design.stopped() {
+        return Ok(design.told(first, None));
+    }
+    let (best, reach) = design.sought(first, &own)?;
+    Ok(design.told(best, Some(reach)))
 }
 
 struct Design<'a> {
@@ -155,6 +108,8 @@ struct Candidate {
     robot: Robot,
     rest: Vec<Vector3<f64>>,
     shape: Shape,
+    /// Distances over the length, and weighted differences of neighbours.
+    residual: DVector<f64>,
     iterations: usize,
     /// The shape is what comes of pulling it from rest.
     cold: bool,
@@ -188,11 +143,12 @@ impl Design<'_> {
             None => rod.solve(self.displacements, &mut work)?,
         };
         let shape = rod.result(self.displacements, report, work);
-        Ok(Candidate { robot, rest, shape, iterations, cold: near.is_none() })
+        let residual = self.residual_of(&shape, &rest);
+        Ok(Candidate { robot, rest, shape, residual, iterations, cold: near.is_none() })
     }
 
-    /// By marching along the wanted places.
-    fn marched(&self) -> Result<Option<Candidate>, InvalidInput> {
+    /// By marching along places.
+    fn marched(&self, places: &[Vector3<f64>]) -> Result<Option<Candidate>, InvalidInput> {
         let rod = RodSettings {
             elements: 1,
             axial: false,
@@ -201,20 +157,11 @@ impl Design<'_> {
         };
         let plan = Plan::new(self.robot, rod)?;
         let twists: Vec<f64> = self.own_rest().iter().map(|rest| rest.z).collect();
-        let found = march(&plan, self.robot.base(), self.targets, &twists, self.displacements);
+        let found = march(&plan, self.robot.base(), places, &twists, self.displacements);
         let Some(answer) = found else { return Ok(None) };
-        let rest: Vec<Vector3<f64>> = answer.march.rest.iter().map(|r| self.bounded(r)).collect();
+        let most = self.settings.max_bend;
+        let rest = answer.march.rest.iter().map(|rest| within(rest, most)).collect();
         self.solved(rest, None, answer.iterations).map(Some)
-    }
-
-    /// A rest strain within the bound of bends.
-    fn bounded(&self, rest: &Vector3<f64>) -> Vector3<f64> {
-        let bend = rest.xy().norm();
-        let share = if bend > self.settings.max_bend { self.settings.max_bend / bend } else { 1.0 };
-        // A rest strain of more than half a turn does not exist.
-        let out = Vector3::new(rest.x * share, rest.y * share, rest.z);
-        // Less a rounding, which the backbone's own check must not see.
-        out * ((1.0 - 1e-15) * std::f64::consts::PI / out.norm()).min(1.0)
     }
 
     fn errors(&self, shape: &Shape) -> Vec<f64> {
@@ -227,24 +174,166 @@ impl Design<'_> {
         self.robot.backbone().total_length()
     }
 
-    fn met(&self, candidate: &Candidate) -> bool {
+    /// Whether every disk is in its place.
+    fn reached(&self, candidate: &Candidate) -> bool {
         let worst = self.errors(&candidate.shape).into_iter().fold(0.0_f64, f64::max);
         let converged = candidate.shape.report.status == Status::Converged;
         converged && worst <= self.settings.tolerance * self.length()
     }
 
-    /// Distances over the length, and weighted differences of neighbours.
-    fn residual(&self, candidate: &Candidate) -> DVector<f64> {
-        let frames = candidate.shape.state.frames.iter().skip(1).zip(self.targets);
+    fn residual_of(&self, shape: &Shape, rest: &[Vector3<f64>]) -> DVector<f64> {
+        let frames = shape.state.frames.iter().skip(1).zip(self.targets);
         let off = frames.flat_map(|(frame, target)| {
             let off = (frame.translation - target) / self.length();
             [off.x, off.y, off.z]
         });
-        let smooth = candidate.rest.windows(2).flat_map(|pair| {
+        let smooth = rest.windows(2).flat_map(|pair| {
             let change = (pair[1] - pair[0]) * self.settings.smoothness;
             [change.x, change.y]
         });
         DVector::from_vec(off.chain(smooth).collect())
+    }
+
+    /// Where a descent leads from a rest shape that follows the displacements.
+    fn refined(&self, start: Candidate) -> Result<Candidate, InvalidInput> {
+        if start.shape.report.status != Status::Converged {
+            return Ok(start);
+        }
+        let left = self.settings.max_iterations.saturating_sub(start.iterations);
+        Ok(descend(self, start, self.settings.max_bend, left)?.0)
+    }
+
+    /// The shape of a rest shape when it is pulled from there.
+    fn pulled(&self, candidate: Candidate) -> Result<Candidate, InvalidInput> {
+        if candidate.cold {
+            return Ok(candidate);
+        }
+        self.solved(candidate.rest, None, candidate.iterations)
+    }
+
+    /// The best of descents from where rods of these lengths come nearest, whatever bends them, and root mean
+    /// square of the distances that they leave \[m\].
+    fn sought(
+        &self,
+        first: Candidate,
+        own: &[Vector3<f64>],
+    ) -> Result<(Candidate, f64), InvalidInput> {
+        let twists: Vec<f64> = own.iter().map(|rest| rest.z).collect();
+        let (robot, targets, kind) = (self.robot, self.targets, self.settings.rod.subsegment);
+        let chain = Chain { robot, targets, kind, twists: &twists, most: PI, stop: self.stop };
+        let mut ways = chain.ways(own)?;
+        let least = ways.first().map_or(0.0, |way| way.cost);
+        if self.settings.max_bend < PI {
+            ways.extend(Chain { most: self.settings.max_bend, ..chain }.ways(own)?);
+        }
+        let enough = least * (1.0 + ENOUGH);
+        let done = |candidate: &Candidate| Self::rank(candidate) <= (false, enough);
+        let mut starts: Vec<Candidate> = Vec::new();
+        for way in ways {
+            if self.stopped() || starts.last().is_some_and(done) {
+                break;
+            }
+            starts.push(match self.marched(&way.places)? {
+                Some(candidate) if candidate.shape.report.status == Status::Converged => candidate,
+                _ => self.solved(way.bends, None, 0)?,
+            });
+        }
+        // These follow where bends that fight the tendons do not.
+        let straight: Vec<_> = own.iter().map(|rest| Vector3::new(0.0, 0.0, rest.z)).collect();
+        for rest in [straight, own.to_vec()] {
+            starts.push(self.solved(rest, None, 0)?);
+        }
+        starts.sort_by(|a, b| Self::rank(a).partial_cmp(&Self::rank(b)).unwrap_or(Ordering::Equal));
+        starts.truncate(REFINED);
+        let mut best = first;
+        for start in starts {
+            if self.stopped() || self.met(&best) || done(&best) {
+                break;
+            }
+            let next = self.pulled(self.refined(start)?)?;
+            let iterations = best.iterations + next.iterations;
+            if Self::rank(&next) < Self::rank(&best) {
+                best = next;
+            }
+            best.iterations = iterations;
+        }
+        let rms = self.length() * (least / targets.len() as f64).sqrt();
+        Ok((best, rms))
+    }
+
+    /// What follows the displacements comes first, then what is nearer.
+    fn rank(candidate: &Candidate) -> (bool, f64) {
+        let status = candidate.shape.report.status;
+        (status != Status::Converged, candidate.residual.norm_squared())
+    }
+
+    /// The outcome; `reach` is the root mean square of the distances that lengths alone leave \[m\], if known.
+    fn told(&self, done: Candidate, reach: Option<f64>) -> Prebend {
+        let errors = self.errors(&done.shape);
+        let worst = errors.iter().copied().fold(0.0_f64, f64::max);
+        let (status, message) = if done.shape.report.status != Status::Converged {
+            let text = format!("the rod does not follow the displacements: {}", done.shape.message);
+            (done.shape.report.status, text)
+        } else if self.reached(&done) || self.settings.smoothness > 0.0 {
+            (Status::Converged, String::new())
+        } else if self.stopped() {
+            (Status::IterationLimit, "stopped before the end".to_owned())
+        } else {
+            let disk = errors.iter().position(|e| *e == worst).unwrap_or(0);
+            let why = self.why(&done, &errors, reach);
+            let text = format!("disk {disk} stays {worst:.3e} m from its place{why}");
+            (Status::Unreachable, text)
+        };
+        let Candidate { robot, shape, iterations, .. } = done;
+        Prebend { robot, shape, errors, iterations, status, message }
+    }
+
+    /// What keeps the disks from their places, as the end of a message: lengths, where they explain at least half
+    /// of the distances, or the bound of bends.
+    fn why(&self, done: &Candidate, errors: &[f64], reach: Option<f64>) -> String {
+        let mean = errors.iter().map(|e| e * e).sum::<f64>() / self.targets.len() as f64;
+        if reach.is_some_and(|reach| reach >= 0.5 * mean.sqrt()) {
+            let worst = errors.iter().copied().fold(0.0_f64, f64::max);
+            // Lengths that are off by less would explain less than a tenth of it, all together.
+            let off = 0.1 * worst / self.length();
+            return hindrance(self.robot, self.targets, self.settings.rod.subsegment, off);
+        }
+        let most = self.settings.max_bend;
+        let bound = |rest: &Vector3<f64>| rest.xy().norm() >= most * (1.0 - 1e-9);
+        let Some(first) = done.rest.iter().position(bound) else { return String::new() };
+        let count = done.rest.iter().filter(|rest| bound(rest)).count();
+        format!(": {count} rest bends, from disk {first} the first, are at max_bend, {most:.6} rad")
+    }
+}
+
+impl Bent for Design<'_> {
+    const HEADWAY: f64 = 1e-9;
+
+    type Point = Candidate;
+
+    fn bends<'a>(&self, point: &'a Candidate) -> &'a [Vector3<f64>] {
+        &point.rest
+    }
+
+    fn residual<'a>(&self, point: &'a Candidate) -> &'a DVector<f64> {
+        &point.residual
+    }
+
+    fn at(
+        &self,
+        bends: Vec<Vector3<f64>>,
+        near: &Candidate,
+    ) -> Result<Option<Candidate>, InvalidInput> {
+        let next = self.solved(bends, Some(&near.shape), near.iterations + 1)?;
+        Ok((next.shape.report.status == Status::Converged).then_some(next))
+    }
+
+    fn met(&self, candidate: &Candidate) -> bool {
+        self.settings.smoothness == 0.0 && self.reached(candidate)
+    }
+
+    fn stopped(&self) -> bool {
+        self.stop.load(Memory::Relaxed)
     }
 
     fn jacobian(&self, candidate: &Candidate) -> Result<DMatrix<f64>, InvalidInput> {
@@ -275,79 +364,5 @@ impl Design<'_> {
             }
         }
         Ok(out)
-    }
-
-    /// Levenberg-Marquardt steps on the bends of the rest shape.
-    fn refine(&self, start: Candidate) -> Result<Candidate, InvalidInput> {
-        let mut best = start;
-        let mut damping = 1e-6;
-        let mut residual = self.residual(&best);
-        while best.iterations < self.settings.max_iterations {
-            if self.stop.load(Ordering::Relaxed)
-                || best.shape.report.status != Status::Converged
-                || (self.met(&best) && self.settings.smoothness == 0.0)
-            {
-                break;
-            }
-            let jacobian = self.jacobian(&best)?;
-            let gradient = jacobian.tr_mul(&residual);
-            let gram = jacobian.tr_mul(&jacobian);
-            let value = residual.norm_squared();
-            let mut lower = None;
-            while damping < 1e9 && !self.stop.load(Ordering::Relaxed) {
-                let mut damped = gram.clone();
-                for k in 0..damped.nrows() {
-                    damped[(k, k)] += damping * (1e-12 + value);
-                }
-                let Some(factor) = damped.cholesky() else {
-                    damping = (10.0 * damping).max(1e-9);
-                    continue;
-                };
-                let step = factor.solve(&gradient);
-                let rest = best.rest.iter().enumerate().map(|(i, rest)| {
-                    self.bounded(&(rest - Vector3::new(step[2 * i], step[2 * i + 1], 0.0)))
-                });
-                let next = self.solved(rest.collect(), Some(&best.shape), best.iterations + 1)?;
-                let next_residual = self.residual(&next);
-                let fits = next.shape.report.status == Status::Converged;
-                if fits && next_residual.norm_squared() < value {
-                    lower = Some((next, next_residual));
-                    break;
-                }
-                damping *= 10.0;
-            }
-            let Some((next, next_residual)) = lower else { break };
-            let headway = 1.0 - next_residual.norm_squared() / value;
-            (best, residual) = (next, next_residual);
-            damping = (0.1 * damping).max(1e-12);
-            if headway < 1e-9 {
-                break;
-            }
-        }
-        Ok(best)
-    }
-
-    fn told(&self, candidate: Candidate) -> Result<Prebend, InvalidInput> {
-        // What it does when it is pulled from rest.
-        let done = if candidate.cold {
-            candidate
-        } else {
-            self.solved(candidate.rest, None, candidate.iterations)?
-        };
-        let errors = self.errors(&done.shape);
-        let worst = errors.iter().copied().fold(0.0_f64, f64::max);
-        let (status, message) = if done.shape.report.status != Status::Converged {
-            let text = format!("the rod does not follow the displacements: {}", done.shape.message);
-            (done.shape.report.status, text)
-        } else if self.met(&done) || self.settings.smoothness > 0.0 {
-            (Status::Converged, String::new())
-        } else {
-            let disk = errors.iter().position(|e| *e == worst).unwrap_or(0);
-            let why = hindrance(self.robot, self.targets, self.settings.rod.subsegment, OFF);
-            let text = format!("disk {disk} stays {worst:.3e} m from its place{why}");
-            (Status::Unreachable, text)
-        };
-        let Candidate { robot, shape, iterations, .. } = done;
-        Ok(Prebend { robot, shape, errors, iterations, status, message })
     }
 }

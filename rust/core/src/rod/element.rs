@@ -17,7 +17,7 @@ struct Coefficient(f64, f64, f64);
 
 /// An element at its strain.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Element {
+pub(crate) struct Element {
     strain: Vector3<f64>,
     /// Stretched \[m\]
     length: f64,
@@ -27,11 +27,11 @@ pub(super) struct Element {
     b: Coefficient,
     c: Coefficient,
     /// Frame of its end in that of its base.
-    pub(super) end: Pose,
+    pub(crate) end: Pose,
     /// Angular velocity of its end by the strain: the left Jacobian.
-    pub(super) spin: Matrix3<f64>,
+    pub(crate) spin: Matrix3<f64>,
     /// Velocity of its end's origin by the strain \[m/rad\].
-    pub(super) sweep: Matrix3<f64>,
+    pub(crate) sweep: Matrix3<f64>,
 }
 
 impl Default for Element {
@@ -44,7 +44,7 @@ impl Element {
     /// An element of a rest length \[m\] that turns by a rotation vector \[rad\] and becomes longer by a
     /// share `elongation`.
     #[inline]
-    pub(super) fn new(
+    pub(crate) fn new(
         kind: Subsegment,
         length: f64,
         strain: Vector3<f64>,

@@ -4,7 +4,7 @@ mod ascent;
 pub(crate) mod balance;
 mod chain;
 pub mod contact;
-mod element;
+pub(crate) mod element;
 pub(crate) mod march;
 mod message;
 mod model;
