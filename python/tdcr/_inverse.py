@@ -33,8 +33,9 @@ __all__ = [
 
 def inverse(
     robot: Robot,
-    target: ArrayLike,
+    target: ArrayLike | None = None,
     *,
+    positions: ArrayLike | None = None,
     model: str = "rod",
     start: ArrayLike | Inverse | Shape | None = None,
     method: Method = "newton",
@@ -59,6 +60,11 @@ def inverse(
     robot : Robot
     target : array_like, shape (3,) or (4, 4)
         Where the tool (``robot.tool``) should be, world frame [m]: a position, or a frame.
+    positions : array_like, shape (n, 3) or (n + 1, 3)
+        Instead, where disks 1 to n should be [m], or all disks, of which the base's row does not
+        count; rows of NaN where it does not matter. What comes nearest by the sum of squared
+        distances; converged when every disk is there. The rod only. To change the robot itself,
+        `design.prebend` and `design.routing`.
     model : {"rod", "constant_curvature"}, optional
     method : {"newton", "pso"}, optional
         "newton" descends from guessed and random starts, and from where a swarm settles as the last
@@ -84,7 +90,7 @@ def inverse(
     Raises
     ------
     InvalidInput
-        A target that is not finite or no rigid motion, bounds or a start that do not fit the robot,
+        Both or neither of target and positions, one that is not finite or no rigid motion, bounds or a start that do not fit the robot,
         a model without inverse, proportional tendons, obstacles or loads for another model than
         the rod.
     Exception
@@ -107,9 +113,14 @@ def inverse(
     search = InverseSettings() if search is None else search
     bounds = _bounds(bounds)
     around = _around(obstacles)
-    row, shape = _core._inverse(
+    if (target is None) == (positions is None):
+        got = "neither" if target is None else "both"
+        raise InvalidInput(f"target: expected a target or positions, got {got}", "target")
+    solve = _core._inverse if positions is None else _core._inverse_places
+    wanted = target if positions is None else positions
+    row, shape = solve(
         robot,
-        target,
+        wanted,  # type: ignore[arg-type]  # One of them is given.
         model,
         _displacements(start),
         bounds,
@@ -121,7 +132,7 @@ def inverse(
     )
     return Inverse(
         robot,
-        _frozen(target),
+        _frozen(wanted),  # type: ignore[arg-type]
         *row,
         model,
         settings,

@@ -44,7 +44,7 @@ class Inverse(Value):
 
     robot: Robot
     target: Array
-    """A position (3,) or a frame (4, 4), world frame [m]."""
+    """A position (3,), a frame (4, 4) or places of disks (n, 3) or (n + 1, 3), world frame [m]."""
     displacements: Array
     """Tendon displacements, (K,) [m]: negative pulls."""
     tensions: Array
@@ -58,7 +58,7 @@ class Inverse(Value):
     """What stood in the way; empty when it converged, unless from rest the displacements lead to
     another shape."""
     error: float
-    """Distance from the tool to the target, over the axes that count [m]."""
+    """Distance from the tool to the target, over the axes that count; the largest of a disk [m]."""
     rotation_error: float
     """Angle from the tool to the target, over the axes that count [rad]; 0 for a position."""
     iterations: int

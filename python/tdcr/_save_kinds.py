@@ -115,7 +115,10 @@ def _count(record: Record, name: str) -> Any:
 
 
 def _places(record: Record, name: str) -> Any:
-    """Positions or frames."""
+    """Positions or frames, or the places of all disks."""
+    value = record.get(name)
+    if not _rows(record) and np.ndim(value) == 2 and len(value[0]) == 3:
+        return record.array(name, -1, 3)
     first = np.ndim(record.get(name)) - len(_rows(record))
     return record.array(name, *_rows(record), *((4, 4) if first == 2 else (3,)))
 

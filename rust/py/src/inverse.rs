@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 use rayon::ThreadPool;
 use tdcr::batch::pool;
 use tdcr::inverse::{
-    Answer, ConstantCurvatureInverse, InverseRows, Inverter, Method, RodInverse, Target,
+    Answer, ConstantCurvatureInverse, InverseRows, Inverter, Method, Placed, RodInverse, Target,
     invert_path, invert_rows,
 };
 use tdcr::model::State;
@@ -257,17 +257,89 @@ pub(crate) fn _inverse(
         }
     };
     let (displacements, tensions, answer, message) = found;
-    let shape = match (state, &plans) {
-        (Some(state), Plans::Rod(plan, Some(scene))) => {
-            let load = Load::Displacements(displacements.clone());
-            let core = &robot.get().0;
-            let solve = |rod: &Watched<'_>| rod.solve_load(load, Some(state));
-            let (given, shape) = surroundings::solve(py, core, plan, scene, solve)?;
-            let choice = Choice::new(model, settings)?;
-            Some(Shape::new(robot.get().clone(), choice, given, shape).among(around))
-        }
-        _ => None,
+    let known = state.map(|state| (displacements.clone(), state));
+    let shape = shape_of(py, robot, &plans, known, Choice::new(model, settings)?, around)?;
+    Ok((row(py, displacements, tensions, &answer, message)?, shape))
+}
+
+/// The shape found, where displacements do not say which it is: solved again from there.
+fn shape_of(
+    py: Python<'_>,
+    robot: &Bound<'_, Robot>,
+    plans: &Plans<'_>,
+    known: Option<(Vec<f64>, State)>,
+    choice: Choice,
+    around: Surroundings,
+) -> PyResult<Option<Shape>> {
+    let (Some((displacements, state)), Plans::Rod(plan, Some(scene))) = (known, plans) else {
+        return Ok(None);
     };
+    let solve = |rod: &Watched<'_>| rod.solve_load(Load::Displacements(displacements), Some(state));
+    let (given, shape) = surroundings::solve(py, &robot.get().0, plan, scene, solve)?;
+    Ok(Some(Shape::new(robot.get().clone(), choice, given, shape).among(around)))
+}
+
+/// Wanted places of disks, from the first: rows of all disks or of those beyond the base, NaN where none is wanted.
+fn wanted_places(
+    robot: &tdcr::robot::Robot,
+    value: &Bound<'_, PyAny>,
+) -> PyResult<Vec<Option<Vector3<f64>>>> {
+    let array = float_array("positions", value)?;
+    let disks = robot.backbone().subsegments();
+    let rows = match array.shape() {
+        [rows, 3] if *rows == disks || *rows == disks + 1 => *rows,
+        shape => {
+            let expected = format!("shape ({disks}, 3) or, with the base, ({}, 3)", disks + 1);
+            return Err(wrong_shape("positions", &expected, shape));
+        }
+    };
+    let rows = values(&array)?.chunks_exact(3).enumerate().skip(rows - disks);
+    rows.map(|(row, place)| {
+        let missing = place.iter().filter(|x| x.is_nan()).count();
+        if missing == 3 {
+            return Ok(None);
+        }
+        if missing > 0 || place.iter().any(|x| x.is_infinite()) {
+            let expected = "finite places [m], or rows of NaN where none is wanted";
+            let got = format!("{place:?} in row {row}");
+            return Err(invalid(&InvalidInput::new("positions", expected, got)));
+        }
+        Ok(Some(Vector3::from_column_slice(place)))
+    })
+    .collect()
+}
+
+/// One inverse for places of the disks.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)] // The keywords of inverse.
+pub(crate) fn _inverse_places(
+    py: Python<'_>,
+    robot: &Bound<'_, Robot>,
+    positions: &Bound<'_, PyAny>,
+    model: &str,
+    start: Option<&Bound<'_, PyAny>>,
+    bounds: Option<&Bound<'_, PyAny>>,
+    settings: Option<&Bound<'_, PyAny>>,
+    search: Option<&Bound<'_, InverseSettings>>,
+    method: &str,
+    obstacles: &Bound<'_, PyAny>,
+    loads: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Row, Option<Shape>)> {
+    let around = Surroundings::new(py, Some(obstacles), loads)?;
+    let plans = Plans::new(robot, model, settings, &around)?;
+    let engine = plans.engine(robot, bounds, search, method)?;
+    let Engine::Rod(inverse) = &engine else { return Err(rod_only("positions", model)) };
+    let places = wanted_places(&robot.get().0, positions)?;
+    let start = one_start(&**inverse, start)?;
+    let found = long_call::run(py, None, |control| {
+        around.stopped_by(&control.stop);
+        inverse.solve_places(&places, start.as_ref(), Some(&control.stop))
+    });
+    checked(py, Mutex::new(inverse.take_fault()))?;
+    let Placed { answer, displacements, tensions, message, state } =
+        found?.map_err(|e| invalid(&e))?;
+    let known = state.map(|state| (displacements.clone(), state));
+    let shape = shape_of(py, robot, &plans, known, Choice::new(model, settings)?, around)?;
     Ok((row(py, displacements, tensions, &answer, message)?, shape))
 }
 

@@ -55,7 +55,7 @@ mod _core {
     #[pymodule_export]
     use crate::forward::{_fields, _forward_batch, forward};
     #[pymodule_export]
-    use crate::inverse::{_inverse, _inverse_batch, _inverse_solutions};
+    use crate::inverse::{_inverse, _inverse_batch, _inverse_places, _inverse_solutions};
     #[pymodule_export]
     use crate::loads::Loads;
     #[pymodule_export]

@@ -3,6 +3,7 @@
 use std::borrow::Borrow;
 
 use super::InverseSettings;
+use super::search::Found;
 use crate::status::Status;
 
 /// How an inverse ended; what it found is in the workspace.
@@ -22,6 +23,11 @@ pub struct Answer {
 }
 
 impl Answer {
+    pub(super) fn of(found: Found, (distance, angle): (f64, f64)) -> Self {
+        let Found { status, iterations, starts } = found;
+        Self { status, distance, angle, iterations, starts }
+    }
+
     /// Of a target that was not sought.
     pub(super) fn none() -> Self {
         Self {

@@ -9,19 +9,21 @@ mod answer;
 mod bounds;
 mod chain;
 mod constant_curvature;
+mod places;
 mod pull;
 mod rod;
 mod rows;
 mod search;
 mod settings;
 mod swarm;
+mod tool;
 
 use nalgebra::{Matrix3, Vector3};
 
 pub use answer::Answer;
 pub use bounds::{Bounds, Range};
 pub use constant_curvature::{ConstantCurvatureInverse, Solution, Workspace};
-pub use rod::{RodInverse, RodWorkspace};
+pub use rod::{Placed, RodInverse, RodWorkspace};
 pub use rows::{InverseRows, Inverter, invert_path, invert_rows};
 pub use settings::{InverseSettings, Method};
 

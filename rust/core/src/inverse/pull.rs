@@ -1,21 +1,42 @@
-//! The rod before a target: residuals of the tool by the tensions, bounds on displacements, the sum of squared
+//! The rod before what is wanted of it: residuals by the tensions, bounds on displacements, the sum of squared
 //! tensions.
 
-use nalgebra::Vector6;
+use nalgebra::SVector;
 
-use crate::robot::Robot;
-use crate::rod::balance::Balance;
+use crate::rod::balance::{Balance, Motion};
 use crate::solve::fit::Problem;
 use crate::solve::quadratic::Rows;
 
-use super::InverseSettings;
-use super::aim::Aim;
+use super::tool::ToolGoal;
+
+/// What is wanted of a rod: residuals at a balance, and their derivatives by the tensions.
+pub(super) trait Goal<const R: usize> {
+    /// Looks at where the rod is.
+    fn place(&mut self, motion: &Motion);
+
+    /// Residuals of the last placing and their derivatives.
+    fn write(
+        &mut self,
+        motion: &Motion,
+        residual: &mut SVector<f64, R>,
+        jacobian: &mut [SVector<f64, R>],
+    );
+
+    /// The squared residuals of the last placing.
+    fn squared(&self) -> f64;
+
+    /// Whether residuals, not those of the last placing in every case, are as small as wanted.
+    fn met(&self, residual: &SVector<f64, R>) -> bool;
+
+    /// Adds the second derivatives of `weights . r` by the tensions to the lower triangle of a matrix.
+    fn curve(&mut self, motion: &mut Motion, weights: &SVector<f64, R>, matrix: &mut [f64]);
+}
 
 /// Unknowns: tensions in such units that each is about the angle by which it bends the rod alone \[rad\].
 #[derive(Debug)]
-pub(super) struct Pull<'a> {
+pub(super) struct Pull<'a, G = ToolGoal<'a>> {
     pub(super) rod: Box<dyn Balance + 'a>,
-    pub(super) aim: Aim<'a>,
+    pub(super) aim: G,
     /// Tension of a unit of every unknown.
     units: &'a [f64],
     /// Lowest and highest displacement of every tendon \[m\].
@@ -26,39 +47,39 @@ pub(super) struct Pull<'a> {
     tensions: Vec<f64>,
     /// The point evaluated last is a balance.
     sound: bool,
-    moved: Vec<f64>,
-    turned: Vec<f64>,
+    second: Vec<f64>,
 }
 
 /// Second derivatives that are nearly right lead to a gradient of this precision in few steps.
 const PRECISION: f64 = 1e-6;
 
-impl<'a> Pull<'a> {
+impl<'a, G> Pull<'a, G> {
     pub(super) fn new(
         rod: Box<dyn Balance + 'a>,
-        robot: &'a Robot,
+        aim: G,
         lengths: &'a [f64],
-        settings: &'a InverseSettings,
         units: &'a [f64],
         ranges: &'a [(f64, f64)],
     ) -> Self {
         let finite = |(lower, upper): &(f64, f64)| lower.is_finite() || upper.is_finite();
         Self {
             rod,
-            aim: Aim::new(robot, settings),
+            aim,
             units,
             ranges,
             lengths,
             bounded: ranges.iter().any(finite),
             tensions: Vec::new(),
             sound: false,
-            moved: Vec::new(),
-            turned: Vec::new(),
+            second: Vec::new(),
         }
     }
 
-    /// Goes to the balance under the tensions of a point and places the tool.
-    fn place(&mut self, z: &[f64]) -> bool {
+    /// Goes to the balance under the tensions of a point and looks at it.
+    fn place<const R: usize>(&mut self, z: &[f64]) -> bool
+    where
+        G: Goal<R>,
+    {
         // Rounding leaves no tension below zero.
         let tension = |(z, unit): (&f64, &f64)| (z * unit).max(0.0);
         let wanted = z.iter().zip(self.units).map(tension);
@@ -71,8 +92,7 @@ impl<'a> Pull<'a> {
             }
         }
         if self.sound {
-            let tool = self.rod.motion().tool;
-            self.aim.place(tool.translation, || tool.rotation);
+            self.aim.place(self.rod.motion());
         }
         self.sound
     }
@@ -98,44 +118,40 @@ impl<'a> Pull<'a> {
     }
 }
 
-impl Problem<6> for Pull<'_> {
-    fn evaluate(&mut self, z: &[f64], residual: &mut Vector6<f64>, jacobian: &mut [Vector6<f64>]) {
-        if !self.place(z) {
+impl<const R: usize, G: Goal<R>> Problem<R> for Pull<'_, G> {
+    fn evaluate(
+        &mut self,
+        z: &[f64],
+        residual: &mut SVector<f64, R>,
+        jacobian: &mut [SVector<f64, R>],
+    ) {
+        if !self.place::<R>(z) {
             // No balance there: a step is not taken.
             residual.fill(f64::NAN);
             return;
         }
-        *residual = self.aim.residual();
-        self.aim.write_columns(&self.rod.motion().columns, jacobian);
+        self.aim.write(self.rod.motion(), residual, jacobian);
         jacobian.iter_mut().zip(self.units).for_each(|(column, unit)| *column *= *unit);
     }
 
     fn squared(&mut self, z: &[f64]) -> f64 {
         // What is infinite is no value, to a swarm.
-        if self.place(z) { self.aim.residual().norm_squared() } else { f64::INFINITY }
+        if self.place::<R>(z) { self.aim.squared() } else { f64::INFINITY }
     }
 
-    fn met(&self, residual: &Vector6<f64>) -> bool {
+    fn met(&self, residual: &SVector<f64, R>) -> bool {
         self.aim.met(residual)
     }
 
-    fn add_hessian(&mut self, z: &[f64], weights: &Vector6<f64>, hessian: &mut [f64]) {
+    fn add_hessian(&mut self, z: &[f64], weights: &SVector<f64, R>, hessian: &mut [f64]) {
         let size = z.len();
-        let rotates = self.aim.rotates();
-        let push = self.aim.curvature(weights);
-        let Self { rod, moved, turned, units, .. } = self;
-        rod.motion_mut().curve(&push.force, &push.moment, moved, turned);
-        let columns = &rod.motion().columns;
+        let Self { rod, aim, second, units, .. } = self;
+        second.clear();
+        second.resize(size * size, 0.0);
+        aim.curve(rod.motion_mut(), weights, second);
         for a in 0..size {
-            let spin = &columns[a].1;
-            let row = push.row(spin);
             for b in 0..=a {
-                let mut sum = moved[a * size + b] + moved[b * size + a];
-                if rotates {
-                    let other = &columns[b].1;
-                    sum += push.rotation(&row, spin, other, turned[a * size + b]);
-                }
-                hessian[a * size + b] += units[a] * units[b] * sum;
+                hessian[a * size + b] += units[a] * units[b] * second[a * size + b];
             }
         }
     }
@@ -199,7 +215,7 @@ impl Problem<6> for Pull<'_> {
     }
 }
 
-impl Pull<'_> {
+impl<G> Pull<'_, G> {
     /// Mean square of the units: the energy is then of order 1.
     fn scale(&self) -> f64 {
         self.units.iter().map(|unit| unit * unit).sum::<f64>() / self.units.len().max(1) as f64
@@ -253,7 +269,7 @@ mod tests {
             let pull = &mut work.pull;
             let turn = so3::exp(&Vector3::new(0.5, -0.3, 0.2));
             let translation = Vector3::new(0.05, 0.02, 0.15);
-            pull.aim.at(Target::Pose(Pose { rotation: turn, translation }));
+            pull.aim.aim.at(Target::Pose(Pose { rotation: turn, translation }));
             check(pull, &[0.9, 0.5, 0.0, 0.7], share, (1e-4, 1e-6));
         }
     }
@@ -281,7 +297,7 @@ mod tests {
             let inverse = inverse.among(&scene).unwrap();
             let mut work = inverse.buffers(None);
             let pull = &mut work.pull;
-            pull.aim.at(Target::Position(Vector3::new(0.05, 0.02, 0.15)));
+            pull.aim.aim.at(Target::Position(Vector3::new(0.05, 0.02, 0.15)));
             let z = [0.9, 0.5, 0.0, 0.7];
             // Shapes are balanced to 5e-11 rad.
             check(pull, &z, f64::INFINITY, (1e-3, 3e-6));

@@ -20,8 +20,8 @@ const LOWER_KINKS: usize = 30;
 
 /// Buffers of a search, and the point it found.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Search<'a> {
-    pub(super) fit: Workspace<6>,
+pub(super) struct Search<'a, const R: usize = 6> {
+    pub(super) fit: Workspace<R>,
     /// The unknowns found.
     pub(super) point: Vec<f64>,
     /// Ends the search before its next start when it is set.
@@ -66,10 +66,10 @@ pub(super) struct Effort<'s> {
     pub(super) swarm: &'s PsoSettings,
 }
 
-impl Search<'_> {
+impl<const R: usize> Search<'_, R> {
     /// Tries `start(k, point)` for one k after the other until a descent meets the target; else finds the point
     /// nearest to it. `point` holds the answer whatever the status, and was evaluated last.
-    pub(super) fn run<P: Problem<6>>(
+    pub(super) fn run<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         space: &Space,
@@ -84,7 +84,7 @@ impl Search<'_> {
     }
 
     /// How the search ended, and after how many starts.
-    fn seek<P: Problem<6>>(
+    fn seek<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         space: &Space,
@@ -136,7 +136,7 @@ impl Search<'_> {
     }
 
     /// Descends from the point at hand: the status if it meets the target.
-    fn descend<P: Problem<6>>(
+    fn descend<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         space: &Space,
@@ -157,7 +157,7 @@ impl Search<'_> {
     }
 
     /// Lowers the energy where the target leaves freedom.
-    fn spend_freedom<P: Problem<6>>(
+    fn spend_freedom<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         space: &Space,
@@ -186,7 +186,7 @@ impl Search<'_> {
     }
 
     /// Descends to a minimum from the best candidates and keeps the best.
-    fn nearest<P: Problem<6>>(
+    fn nearest<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         space: &Space,

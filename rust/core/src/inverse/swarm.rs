@@ -11,15 +11,15 @@ use crate::solve::region::{Region, Restoring};
 
 /// The squared residual at the nearest point of the region, and the squared way there: a box holds the
 /// swarm, the region's other bounds draw it in.
-struct Cost<'a, P> {
-    problem: &'a mut P,
+struct Cost<'a, F> {
+    squared: F,
     region: &'a Region,
     inside: Restoring,
     point: Vec<f64>,
     stop: Option<&'a AtomicBool>,
 }
 
-impl<P: Problem<6>> Objective for Cost<'_, P> {
+impl<F: FnMut(&[f64]) -> f64> Objective for Cost<'_, F> {
     type Error = Infallible;
 
     fn values(
@@ -34,7 +34,7 @@ impl<P: Problem<6>> Objective for Cost<'_, P> {
             // A value that is left out is none.
             if self.region.restore(&mut self.point, &mut self.inside) {
                 let way = self.point.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-                *value = self.problem.squared(&self.point) + way;
+                *value = (self.squared)(&self.point) + way;
             }
         }
         Ok(())
@@ -45,9 +45,9 @@ impl<P: Problem<6>> Objective for Cost<'_, P> {
     }
 }
 
-impl Search<'_> {
+impl<const R: usize> Search<'_, R> {
     /// Puts the place where a swarm settles into `point`, inside the region; false when it found none.
-    pub(super) fn settle<P: Problem<6>>(
+    pub(super) fn settle<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         space: &Space,
@@ -60,7 +60,7 @@ impl Search<'_> {
         let Some(swarm) = &mut self.swarm else { return false };
         swarm.reseed(settings.seed.wrapping_add(round as u64));
         let mut cost = Cost {
-            problem,
+            squared: |z: &[f64]| problem.squared(z),
             region: &space.region,
             inside: Restoring::default(),
             point: Vec::new(),

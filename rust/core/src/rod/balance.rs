@@ -5,7 +5,7 @@
 
 use std::fmt::Debug;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::lie::Pose;
 use crate::model::State;
@@ -68,6 +68,10 @@ pub(crate) struct Motion {
     pub(crate) tool: Pose,
     /// Velocity of the tool and angular velocity by every tension, in the base's axes.
     pub(crate) columns: Vec<Twist>,
+    /// Place of every disk from the first, in the base's frame.
+    pub(crate) disks: Vec<Vector3<f64>>,
+    /// Where the tool is taken to be in the velocities.
+    point: Vector3<f64>,
     /// Every subsegment's shares of them, with the tendon, and where each subsegment's end.
     shares: Vec<(usize, Twist)>,
     ends: Vec<usize>,
@@ -80,6 +84,8 @@ impl Motion {
         Self {
             tool: Pose::identity(),
             columns: Vec::new(),
+            disks: Vec::new(),
+            point: Vector3::zeros(),
             shares: Vec::new(),
             ends: Vec::new(),
             spins: Vec::new(),
@@ -88,7 +94,8 @@ impl Motion {
 
     /// Begins with a tool that so many tensions do not move.
     pub(super) fn begin(&mut self, tool: Pose, count: usize) {
-        self.tool = tool;
+        (self.tool, self.point) = (tool, tool.translation);
+        self.disks.clear();
         self.columns.clear();
         self.columns.resize(count, (Vector3::zeros(), Vector3::zeros()));
         self.shares.clear();
@@ -107,6 +114,33 @@ impl Motion {
         self.ends.push(self.shares.len());
     }
 
+    /// Places the disks beyond the base at their frames, moved by every subsegment's share of a motion of the tool.
+    pub(super) fn place(&mut self, frames: &[Pose], shares: impl IntoIterator<Item = Twist>) {
+        let mut sum = (Vector3::zeros(), Vector3::zeros());
+        for (frame, share) in frames.iter().skip(1).zip(shares) {
+            sum = (sum.0 + share.0, sum.1 + share.1);
+            let at = frame.translation;
+            self.disks.push(at + sum.0 + sum.1.cross(&(at - self.point)));
+        }
+    }
+
+    /// Velocities of the disks by the tensions: all of the first disk, all of the next one.
+    pub(crate) fn write_velocities(&self, out: &mut Vec<Vector3<f64>>) {
+        let count = self.columns.len();
+        out.clear();
+        let mut sums = vec![(Vector3::zeros(), Vector3::zeros()); count];
+        let mut start = 0;
+        for (end, at) in self.ends.iter().zip(&self.disks) {
+            for (tendon, share) in &self.shares[start..*end] {
+                let sum = &mut sums[*tendon];
+                *sum = (sum.0 + share.0, sum.1 + share.1);
+            }
+            let arm = at - self.point;
+            out.extend(sums.iter().map(|(moved, spin)| moved + spin.cross(&arm)));
+            start = *end;
+        }
+    }
+
     /// Second derivatives of the tool's place times a force and of its rotation times a moment, by two tensions, into
     /// two square matrices: `(a, b)` of the first summed with `(b, a)`; of the second, the change of column a by
     /// tension b. As if tensions turned every subsegment by as much as they do here: what is left out is that of its
@@ -118,16 +152,34 @@ impl Motion {
         moved: &mut Vec<f64>,
         turned: &mut Vec<f64>,
     ) {
-        let count = self.columns.len();
-        for matrix in [&mut *moved, &mut *turned] {
-            matrix.clear();
-            matrix.resize(count * count, 0.0);
+        self.turn(moved, |_, share| share.0.cross(force));
+        self.turn(turned, |_, share| share.1.cross(moment));
+    }
+
+    /// The same of the disks' places times a force on each, summed.
+    pub(crate) fn curve_places(&mut self, forces: &[Vector3<f64>], moved: &mut Vec<f64>) {
+        // Of all forces beyond every subsegment, with `(w × d) × f = d (w · f) − w (d · f)`.
+        let mut beyond = vec![(Vector3::zeros(), Matrix3::zeros()); forces.len()];
+        let (mut force, mut arms) = (Vector3::zeros(), Matrix3::zeros());
+        for ((own, at), f) in beyond.iter_mut().zip(&self.disks).zip(forces).rev() {
+            let arm = at - self.point;
+            force += f;
+            arms += arm * f.transpose() - Matrix3::from_diagonal_element(arm.dot(f));
+            *own = (force, arms);
         }
+        self.turn(moved, |i, share| share.0.cross(&beyond[i].0) + beyond[i].1 * share.1);
+    }
+
+    /// Sums the spins of every subsegment's middle by tension b, times what a share of a causes beyond: `(a, b)`.
+    fn turn(&mut self, out: &mut Vec<f64>, swing: impl Fn(usize, &Twist) -> Vector3<f64>) {
+        let count = self.columns.len();
+        out.clear();
+        out.resize(count * count, 0.0);
         let Self { shares, ends, spins, .. } = self;
         spins.clear();
         spins.resize(count, Vector3::zeros());
         let mut start = 0;
-        for end in ends {
+        for (i, end) in ends.iter().enumerate() {
             let own = &shares[start..*end];
             let halve = |spins: &mut [Vector3<f64>]| {
                 for (tendon, share) in own {
@@ -137,13 +189,9 @@ impl Motion {
             // Half a subsegment turns the other half.
             halve(spins);
             for (tendon, share) in own {
-                let (swung, spun) = (share.0.cross(force), share.1.cross(moment));
-                let row = tendon * count..(tendon + 1) * count;
-                let rows = moved[row.clone()].iter_mut().zip(&mut turned[row]);
-                for ((moved, turned), spin) in rows.zip(spins.iter()) {
-                    *moved += spin.dot(&swung);
-                    *turned += spin.dot(&spun);
-                }
+                let swung = swing(i, share);
+                let row = &mut out[tendon * count..(tendon + 1) * count];
+                row.iter_mut().zip(spins.iter()).for_each(|(out, spin)| *out += spin.dot(&swung));
             }
             halve(spins);
             start = *end;

@@ -54,6 +54,8 @@ pub(crate) struct Pulled<'r> {
     sweep: Sweep,
     frames: Vec<Pose>,
     motion: Motion,
+    /// What balance the strains of every subsegment lack moves the tool by this.
+    lacks: Vec<Twist>,
 }
 
 impl<'r> Pulled<'r> {
@@ -66,6 +68,7 @@ impl<'r> Pulled<'r> {
             sweep: Sweep::default(),
             frames: Vec::new(),
             motion: Motion::new(),
+            lacks: Vec::new(),
         };
         pulled.rest();
         pulled
@@ -149,8 +152,8 @@ impl<'r> Pulled<'r> {
         let tool = frame.compose(self.rod.robot.tool());
         let motion = &mut self.motion;
         motion.begin(tool, chain.tensions.len());
-        // What balance the strains lack moves the tool by this.
-        let mut lack: Twist = (Vector3::zeros(), Vector3::zeros());
+        let lacks = &mut self.lacks;
+        lacks.clear();
         let at = Solved { strains: &chain.strains, factors: &chain.factors, frames: &self.frames };
         self.sweep.run::<D>(plan, &at, &tool.translation, |i, rows| {
             let product = |image: &[f64]| {
@@ -161,9 +164,11 @@ impl<'r> Pulled<'r> {
                 motion.add(plan.pieces[p].tendon, product(&chain.images[p * size..(p + 1) * size]));
             }
             motion.next();
-            let share = product(&chain.gradients[i * size..(i + 1) * size]);
-            lack = (lack.0 + share.0, lack.1 + share.1);
+            lacks.push(product(&chain.gradients[i * size..(i + 1) * size]));
         });
+        motion.place(&self.frames, lacks.iter().copied());
+        let sum = |sum: Twist, lack: &Twist| (sum.0 + lack.0, sum.1 + lack.1);
+        let lack = lacks.iter().fold((Vector3::zeros(), Vector3::zeros()), sum);
         let tool = &mut motion.tool;
         tool.translation += lack.0;
         tool.rotation = so3::exp(&lack.1) * tool.rotation;

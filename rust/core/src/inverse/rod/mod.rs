@@ -2,6 +2,7 @@
 
 mod path;
 mod rise;
+mod shape;
 mod starts;
 
 use std::f64::consts::TAU;
@@ -10,12 +11,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Vector2, Vector3};
 
+use super::aim::Aim;
 use super::answer::{Answer, tell};
 use super::bounds::{Bounds, Space};
 use super::constant_curvature::{self, ConstantCurvatureInverse};
 use super::pull::Pull;
 use super::rows::Inverter;
 use super::search::{Effort, Found, Freedom, Search};
+use super::tool::ToolGoal;
 use super::{InverseSettings, Method, Target};
 use crate::error::InvalidInput;
 use crate::model::{Model, State};
@@ -29,6 +32,7 @@ use crate::solve::fit::Problem;
 use crate::solve::region::Region;
 use crate::status::Status;
 use rise::Rise;
+pub use shape::Placed;
 
 /// Buffers of a solve and the tensions it found.
 #[derive(Debug)]
@@ -144,11 +148,52 @@ impl<'a> RodInverse<'a> {
             return Answer::none();
         }
         let answer = solve(work);
-        let own = work.rise.as_mut().and_then(Rise::take_fault);
-        if let Some(new) = work.pull.rod.take_fault().or(own) {
-            fault().get_or_insert(new);
-        }
+        self.note_fault(work.pull.rod.as_mut(), work.rise.as_mut());
         answer
+    }
+
+    /// Keeps the first fault of an obstacle's function.
+    fn note_fault(&self, rod: &mut dyn Balance, rise: Option<&mut Rise<'_>>) {
+        let own = rise.and_then(Rise::take_fault);
+        if let Some(new) = rod.take_fault().or(own) {
+            self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(new);
+        }
+    }
+
+    /// The robot under tensions, at rest.
+    fn balance<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Box<dyn Balance + 'w> {
+        match &self.loaded {
+            Some(rod) => Box::new(Leaning::new(rod.clone(), stop)),
+            None => Box::new(self.rest.clone()),
+        }
+    }
+
+    fn rise(&self) -> Option<Rise<'_>> {
+        self.loaded.as_ref().map(|rod| Rise::new(rod, self.robot, &self.ranges))
+    }
+
+    /// Bounds that hold a point back.
+    fn held<G>(&self, point: &[f64], pull: &Pull<'_, G>) -> Vec<String> {
+        let names = self.robot.tendon_names();
+        let (edges, _) = self.space.region.at_edge(point, AT_EDGE);
+        let labels = edges.iter().map(|k| self.labels[*k].clone());
+        let mut held: Vec<String> = labels.filter(|label| !label.is_empty()).collect();
+        held.extend(pull.holding(AT_EDGE).into_iter().map(|(k, release)| {
+            format!("{} of '{}'", if release { "release" } else { "pull" }, names[k])
+        }));
+        held
+    }
+
+    fn write_tensions_of(&self, rod: &dyn Balance, place: &mut [f64]) {
+        for (own, tension) in place.iter_mut().zip(rod.tensions()) {
+            *own = tension * self.rest.unit();
+        }
+    }
+
+    fn write_displacements_of(&self, rod: &dyn Balance, place: &mut [f64]) {
+        for (k, (displacement, (lower, upper))) in place.iter_mut().zip(&self.ranges).enumerate() {
+            *displacement = rod.displacement(k).max(*lower).min(*upper);
+        }
     }
 
     /// Tendons only pull, within bounds.
@@ -186,7 +231,7 @@ impl<'a> RodInverse<'a> {
     ) -> Answer {
         let RodWorkspace { pull, search, guess, bends, met, before: row_before, .. } = work;
         *row_before = None;
-        pull.aim.at(*target);
+        pull.aim.aim.at(*target);
         let first: Vec<f64> = if given { self.unknowns(pull.rod.tensions()) } else { Vec::new() };
         let before = usize::from(given);
         let start = |k: usize, point: &mut Vec<f64>| {
@@ -259,19 +304,21 @@ impl Inverter for RodInverse<'_> {
     }
 
     fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> RodWorkspace<'w> {
-        let rod: Box<dyn Balance> = match &self.loaded {
-            Some(rod) => Box::new(Leaning::new(rod.clone(), stop)),
-            None => Box::new(self.rest.clone()),
-        };
         let lengths = self.rest.rest_lengths();
         RodWorkspace {
-            pull: Pull::new(rod, self.robot, lengths, &self.settings, &self.units, &self.ranges),
+            pull: Pull::new(
+                self.balance(stop),
+                ToolGoal::new(Aim::new(self.robot, &self.settings)),
+                lengths,
+                &self.units,
+                &self.ranges,
+            ),
             search: Search { stop, ..Search::default() },
             guess: self.arcs.as_ref().map(ConstantCurvatureInverse::workspace),
             bends: Vec::new(),
             met: false,
             before: None,
-            rise: self.loaded.as_ref().map(|rod| Rise::new(rod, self.robot, &self.ranges)),
+            rise: self.rise(),
         }
     }
 
@@ -296,9 +343,7 @@ impl Inverter for RodInverse<'_> {
     }
 
     fn write_tensions(&self, work: &RodWorkspace<'_>, place: &mut [f64]) {
-        for (own, tension) in place.iter_mut().zip(work.pull.rod.tensions()) {
-            *own = tension * self.rest.unit();
-        }
+        self.write_tensions_of(work.pull.rod.as_ref(), place);
     }
 
     fn state(&self, work: &mut RodWorkspace<'_>) -> Option<State> {
@@ -306,13 +351,7 @@ impl Inverter for RodInverse<'_> {
     }
 
     fn message(&self, answer: &Answer, work: &RodWorkspace<'_>) -> String {
-        let names = self.robot.tendon_names();
-        let (edges, _) = self.space.region.at_edge(&work.search.point, AT_EDGE);
-        let labels = edges.iter().map(|k| self.labels[*k].clone());
-        let mut held: Vec<String> = labels.filter(|label| !label.is_empty()).collect();
-        held.extend(work.pull.holding(AT_EDGE).into_iter().map(|(k, release)| {
-            format!("{} of '{}'", if release { "release" } else { "pull" }, names[k])
-        }));
+        let held = self.held(&work.search.point, &work.pull);
         let told = tell(answer, &self.settings, &held, "tension");
         match &work.rise {
             Some(rise) if told.is_empty() => rise.message().to_owned(),
@@ -321,15 +360,11 @@ impl Inverter for RodInverse<'_> {
     }
 
     fn write_displacements(&self, work: &RodWorkspace<'_>, place: &mut [f64]) {
-        for (k, (displacement, (lower, upper))) in place.iter_mut().zip(&self.ranges).enumerate() {
-            *displacement = work.pull.rod.displacement(k).max(*lower).min(*upper);
-        }
+        self.write_displacements_of(work.pull.rod.as_ref(), place);
     }
 }
 
 fn answer(found: Found, pull: &mut Pull<'_>, search: &mut Search<'_>) -> Answer {
     search.fit.evaluate(pull, &search.point);
-    let (distance, angle) = pull.aim.misses();
-    let Found { status, iterations, starts } = found;
-    Answer { status, distance, angle, iterations, starts }
+    Answer::of(found, pull.aim.aim.misses())
 }

@@ -52,13 +52,13 @@ impl RodInverse<'_> {
     /// Goes from the point at hand to the target aimed at; nothing where steps do not lead there.
     pub(super) fn walk(&self, work: &mut RodWorkspace<'_>) -> Option<Answer> {
         let effort = Effort { fall_back: false, nearest: false, ..self.effort(1) };
-        let (from, to) = (work.pull.rod.motion().tool, work.pull.aim.target());
+        let (from, to) = (work.pull.rod.motion().tool, work.pull.aim.aim.target());
         let (mut done, mut stride, mut iterations) = (0.0, 1.0_f64, 0);
-        let way = work.pull.aim.way(&from, &to);
+        let way = work.pull.aim.aim.way(&from, &to);
         let mut last = work.search.point.clone();
         while done < 1.0 {
             let next = (done + stride).min(1.0);
-            work.pull.aim.between(&from, &to, next);
+            work.pull.aim.aim.between(&from, &to, next);
             if stride >= 1.0
                 && let Some((point, place)) = &work.before
             {
@@ -105,7 +105,7 @@ impl RodInverse<'_> {
             return self.search(target, given, Effort { fall_back: false, ..few }, work);
         }
         let here = (work.search.point.clone(), work.pull.rod.motion().tool.translation);
-        work.pull.aim.at(*target);
+        work.pull.aim.aim.at(*target);
         if let Some(answer) = self.walk(work) {
             work.before = Some(here);
             return answer;

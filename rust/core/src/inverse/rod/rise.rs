@@ -2,7 +2,7 @@
 
 use crate::error::InvalidInput;
 use crate::inverse::bounds::Space;
-use crate::inverse::pull::Pull;
+use crate::inverse::pull::{Goal, Pull};
 use crate::inverse::search::{Effort, Found, Freedom, Search};
 use crate::lie::{Pose, so3};
 use crate::model::Model;
@@ -36,10 +36,10 @@ impl<'a> Rise<'a> {
     }
 
     /// Searches on until rest leads to an answer, or for a few more answers; the first is kept otherwise.
-    pub(super) fn search(
+    pub(super) fn search<const R: usize, G: Goal<R>>(
         &mut self,
-        pull: &mut Pull<'_>,
-        search: &mut Search<'_>,
+        pull: &mut Pull<'_, G>,
+        search: &mut Search<'_, R>,
         space: &Space,
         effort: Effort<'_>,
         mut start: impl FnMut(usize, &mut Vec<f64>),
@@ -89,7 +89,7 @@ impl<'a> Rise<'a> {
     }
 
     /// Whether the displacements at hand bring the tool to where it is.
-    fn comes_to(&mut self, pull: &Pull<'_>) -> Result<bool, InvalidInput> {
+    fn comes_to<G>(&mut self, pull: &Pull<'_, G>) -> Result<bool, InvalidInput> {
         let own = self.ranges.iter().enumerate();
         let displacements: Vec<f64> =
             own.map(|(k, (low, high))| pull.rod.displacement(k).max(*low).min(*high)).collect();
@@ -118,7 +118,12 @@ impl<'a> Rise<'a> {
 }
 
 /// Back to an answer that was kept, evaluated.
-fn back(pull: &mut Pull<'_>, search: &mut Search<'_>, place: usize, point: &[f64]) {
+fn back<const R: usize, G: Goal<R>>(
+    pull: &mut Pull<'_, G>,
+    search: &mut Search<'_, R>,
+    place: usize,
+    point: &[f64],
+) {
     pull.forget();
     pull.rod.go_back(place);
     search.point.clear();

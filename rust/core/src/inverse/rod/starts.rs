@@ -39,7 +39,7 @@ impl RodInverse<'_> {
     }
 
     /// The tensions that bend the rod most nearly so, by its stiffness at rest.
-    fn towards(&self, bends: &[Vector2<f64>], point: &mut Vec<f64>) {
+    pub(super) fn towards(&self, bends: &[Vector2<f64>], point: &mut Vec<f64>) {
         let turns: Vec<_> = bends.iter().map(|b| Vector3::new(-b.y, b.x, 0.0)).collect();
         let mut right = Vec::new();
         let mut matrix = self.rest.shorten(&turns, &mut right).to_vec();
@@ -54,7 +54,7 @@ impl RodInverse<'_> {
     }
 
     /// The circle that leaves the base along z and brings the tool to the target.
-    fn single_arc(&self, target: &Target, bends: &mut Vec<Vector2<f64>>) {
+    pub(super) fn single_arc(&self, target: &Target, bends: &mut Vec<Vector2<f64>>) {
         let (base, tool) = (self.robot.base().inverse(), self.robot.tool());
         let backbone = self.robot.backbone();
         let length = backbone.total_length();
@@ -71,7 +71,7 @@ impl RodInverse<'_> {
         bends.extend(backbone.lengths().iter().map(|own| bend * (own / length)));
     }
 
-    fn random(&self, k: usize, point: &mut Vec<f64>) {
+    pub(super) fn random(&self, k: usize, point: &mut Vec<f64>) {
         let mut draws = ChaCha8Rng::seed_from_u64(self.settings.seed);
         draws.set_stream(k as u64);
         let share = if k.is_multiple_of(4) { 1.0 } else { USUAL / WIDEST };

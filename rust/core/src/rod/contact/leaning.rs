@@ -55,9 +55,9 @@ pub(crate) struct Leaning<'r> {
     kept: [Point; 2],
     /// Whether the descent's shape is that of the point at hand.
     held: bool,
-    /// By what the balance at hand lacks: the tip's displacement, a twist about the base's origin, and what lengths
+    /// By what the balance at hand lacks: displacements of the disks, twists about the base's origin, and what lengths
     /// gain.
-    lack: (Vector6<f64>, Vec<f64>),
+    lack: (Vec<Vector6<f64>>, Vec<f64>),
     motion: Motion,
     /// What every tendon's length gains by every tension, one row per tension \[m\].
     grown: Vec<Vec<f64>>,
@@ -76,7 +76,7 @@ impl<'r> Leaning<'r> {
             at: 0,
             kept: Default::default(),
             held: false,
-            lack: (Vector6::zeros(), vec![0.0; count]),
+            lack: (Vec::new(), vec![0.0; count]),
             motion: Motion::new(),
             grown: vec![Vec::new(); count],
         };
@@ -107,7 +107,8 @@ impl<'r> Leaning<'r> {
         }
         let sound = self.work.ending == Ending::Converged;
         if sound {
-            self.lack.0 = self.work.descent.lack(self.rod.plan(), &mut self.lack.1);
+            let (disks, lengths) = &mut self.lack;
+            self.work.descent.write_lack(self.rod.plan(), disks, lengths);
         }
         Point { kept: self.work.kept.clone(), tensions, sound }
     }
@@ -198,12 +199,15 @@ impl Balance for Leaning<'_> {
         let plan = self.rod.plan();
         let tip = self.frame();
         let mut tool = tip.compose(self.rod.robot().tool());
-        let part = |row: usize| -> Vector3<f64> { self.lack.0.fixed_rows::<3>(row).into() };
-        tool.translation += part(3) + part(0).cross(&tool.translation);
-        tool.rotation = so3::exp(&part(0)) * tool.rotation;
+        let lack = self.lack.0.last().copied().unwrap_or_default();
+        let (spin, moved) = (part(&lack, 0), part(&lack, 3));
+        tool.translation += moved + spin.cross(&tool.translation);
+        tool.rotation = so3::exp(&spin) * tool.rotation;
         let count = self.grown.len();
         let moment = self.rod.scene().moment;
         self.motion.begin(tool, count);
+        let shares = self.lack.0.windows(2).map(|w| about(&(w[1] - w[0]), &tool.translation));
+        self.motion.place(&self.work.descent.here.frames, shares);
         let mut all: Vec<Vec<Vector6<f64>>> = Vec::with_capacity(count);
         for (k, grown) in self.grown.iter_mut().enumerate() {
             all.push(self.work.descent.respond(plan, &moment, k).to_vec());
@@ -212,10 +216,7 @@ impl Balance for Leaning<'_> {
         for i in 1..=plan.data.len() {
             for (k, moved) in all.iter().enumerate() {
                 let twist = moved[i] - moved[i - 1];
-                let spin: Vector3<f64> = twist.fixed_rows::<3>(0).into();
-                let velocity: Vector3<f64> = twist.fixed_rows::<3>(3).into();
-                let share: Twist = (velocity + spin.cross(&tool.translation), spin);
-                self.motion.add(k, share);
+                self.motion.add(k, about(&twist, &tool.translation));
             }
             self.motion.next();
         }
@@ -256,4 +257,14 @@ impl Balance for Leaning<'_> {
     fn take_fault(&mut self) -> Option<Fault> {
         self.work.fault.take()
     }
+}
+
+fn part(twist: &Vector6<f64>, row: usize) -> Vector3<f64> {
+    Vector3::new(twist[row], twist[row + 1], twist[row + 2])
+}
+
+/// Velocity of a point and angular velocity.
+fn about(twist: &Vector6<f64>, point: &Vector3<f64>) -> Twist {
+    let spin = part(twist, 0);
+    (part(twist, 3) + spin.cross(point), spin)
 }

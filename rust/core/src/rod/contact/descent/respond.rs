@@ -51,11 +51,16 @@ impl Descent {
         &self.sweep.moved
     }
 
-    /// First-order displacement of the tip, a twist about the base's origin, by the Newton step from where the descent
+    /// First-order displacements of the disks, twists about the base's origin, by the Newton step from where the descent
     /// ended, and what that adds to the lengths of the tendons.
-    pub(in super::super) fn lack(&self, plan: &Plan, lengths: &mut Vec<f64>) -> Vector6<f64> {
+    pub(in super::super) fn write_lack(
+        &self,
+        plan: &Plan,
+        disks: &mut Vec<Vector6<f64>>,
+        lengths: &mut Vec<f64>,
+    ) {
         self.sweep.lengthen(plan, lengths);
-        self.sweep.moved.last().copied().unwrap_or_default()
+        disks.clone_from(&self.sweep.moved);
     }
 
     /// What the last response adds to the length of every tendon.
