@@ -231,9 +231,7 @@ def _side(values: ArrayLike, count: int) -> Array:
     return side
 
 
-def _rows(
-    robot: Robot, given: Iterable[ArrayLike | Curve], subsegment: str
-) -> list[Array]:
+def _rows(robot: Robot, given: Iterable[ArrayLike | Curve], subsegment: str) -> list[Array]:
     """Wanted places of every row; what is wrong with one names it."""
     try:
         rows = list(given)

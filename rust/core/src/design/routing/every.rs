@@ -12,6 +12,8 @@ use super::task::Holes;
 const STRIDE: f64 = 0.05;
 const SHARE: f64 = 0.03;
 const LOAD: f64 = 100.0;
+/// How much steeper than at their beginning valleys may fall.
+const MARGIN: f64 = 1.5;
 /// Valleys that are polished whether or not they can hold the nearest.
 const POLISHED: usize = 20;
 
@@ -26,31 +28,19 @@ struct At {
 /// Where a routing has a least sum of squared distances.
 struct Valley {
     holes: Holes,
-    tension: f64,
+    from: f64,
+    to: f64,
     /// What that is not expected to fall below.
     least: f64,
 }
 
 impl Valley {
-    /// Between two tensions of a row; none if it does not fall from the first and rise to the second. Where a
-    /// function is convex it lies above its tangents: half as much again is allowed for.
-    fn between(holes: &Holes, from: At, to: At) -> Option<Self> {
-        if from.slope >= 0.0 || to.slope < 0.0 {
-            return None;
-        }
-        let (down, up, wide) = (2.0 * from.slope, 2.0 * to.slope, to.tension - from.tension);
-        let cut = ((to.value - from.value - up * wide) / (down - up)).clamp(0.0, wide);
-        let under = from.value.min(to.value);
-        let least = under - 1.5 * (under - (from.value + down * cut)).max(0.0);
-        let tension = from.tension + wide * from.slope / (from.slope - to.slope);
-        Some(Self { holes: holes.clone(), tension, least })
-    }
-
-    /// Beyond the last tension of a row, if it still falls there.
-    fn beyond(holes: &Holes, last: At, wide: f64) -> Option<Self> {
-        let least = last.value + 3.0 * last.slope * wide;
-        let own = Self { holes: holes.clone(), tension: last.tension, least };
-        (last.slope < 0.0).then_some(own)
+    /// From a tension of a row to the next, where it no longer falls or the routing has no shape; none if it does not
+    /// fall from the first on. It may end in an edge: where a tendon that crosses sides goes aside, at the latest.
+    fn new(holes: &Holes, from: At, to: f64, rises: bool) -> Option<Self> {
+        let least = from.value + MARGIN * 2.0 * from.slope * (to - from.tension);
+        let own = Self { holes: holes.clone(), from: from.tension, to, least };
+        (from.slope < 0.0 && rises).then_some(own)
     }
 }
 
@@ -76,7 +66,12 @@ impl Search<'_, '_> {
                 self.left_out = Some(valley.least);
                 return;
             }
-            self.try_holes(&valley.holes, &[valley.tension]);
+            let within = (valley.from, valley.to);
+            let bottom = self.follower.bottom(self.task, &valley.holes, self.count, within);
+            // A valley with edges may have more than one bottom.
+            for tension in [bottom, valley.from, 0.5 * (valley.from + valley.to), valley.to] {
+                self.try_holes(&valley.holes, &[tension]);
+            }
         }
         self.left_out = Some(f64::INFINITY);
     }
@@ -100,17 +95,20 @@ impl Search<'_, '_> {
             let mut now = BTreeMap::new();
             for leaf in leaves.flatten()? {
                 let at = At { tension: tensions[0], value: leaf.value, slope: leaf.slope[0] };
+                let rises = at.slope >= 0.0;
                 let before = ends.remove(&leaf.holes);
-                valleys.extend(before.and_then(|last| Valley::between(&leaf.holes, last, at)));
+                valleys.extend(
+                    before.and_then(|last| Valley::new(&leaf.holes, last, tensions[0], rises)),
+                );
                 now.insert(leaf.holes, at);
             }
-            let wide = stride.max(SHARE * tensions[0]);
-            valleys.extend(ends.iter().filter_map(|(holes, at)| Valley::beyond(holes, *at, wide)));
+            let ended = |(holes, at): (&Holes, &At)| Valley::new(holes, *at, tensions[0], true);
+            valleys.extend(ends.iter().filter_map(ended));
             ends = now;
-            tensions[0] += wide;
+            tensions[0] += stride.max(SHARE * tensions[0]);
         }
-        let wide = SHARE * last;
-        valleys.extend(ends.iter().filter_map(|(holes, at)| Valley::beyond(holes, *at, wide)));
+        let ended = |(holes, at): (&Holes, &At)| Valley::new(holes, *at, tensions[0], true);
+        valleys.extend(ends.iter().filter_map(ended));
         self.solved += field.solved();
         Some(valleys)
     }

@@ -39,7 +39,8 @@ impl Judged {
 pub(super) struct Judge<'t, 'a> {
     task: &'t Task<'a>,
     pub(super) best: Option<Judged>,
-    tried: BTreeSet<Holes>,
+    /// Holes, and the bits of the tensions.
+    tried: BTreeSet<(Holes, Vec<u64>)>,
     /// Those that do not.
     lost: Vec<(Point, Option<Holes>)>,
     pub(super) steps: usize,
@@ -68,13 +69,17 @@ impl<'t, 'a> Judge<'t, 'a> {
         least: f64,
     ) -> Result<bool, InvalidInput> {
         let task = self.task;
-        for (i, candidate) in search.found().into_iter().take(TRIED).enumerate() {
+        // Where all were looked at, none that is nearer may be left out.
+        let whole = search.left_out.is_some();
+        let (most, tried) = if whole { (usize::MAX, usize::MAX) } else { (most, TRIED) };
+        for (i, candidate) in search.found().into_iter().take(tried).enumerate() {
             let value = self.value();
             let enough = i >= most && value.is_finite();
             if enough || candidate.value >= value || candidate.value > least || task.stopped() {
                 break;
             }
-            if self.tried.insert(candidate.holes.clone()) {
+            let bits = candidate.tensions.iter().map(|t| t.to_bits()).collect();
+            if self.tried.insert((candidate.holes.clone(), bits)) {
                 let robot = task.with_holes(&candidate.holes, search.count)?;
                 let tensions: Vec<f64> =
                     candidate.tensions.iter().map(|t| t * task.plan.unit).collect();

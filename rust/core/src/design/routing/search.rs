@@ -37,9 +37,11 @@ pub(super) struct Search<'t, 'a> {
     pub(super) task: &'t Task<'a>,
     /// Holes per disk.
     pub(super) count: usize,
-    follower: Follower,
+    pub(super) follower: Follower,
     /// Every routing whose tensions were polished.
     known: BTreeMap<Holes, Candidate>,
+    /// Other valleys of the same routings, where all are looked at.
+    seconds: Vec<Candidate>,
     /// Routings none of whose neighbours is nearer, and their values.
     rested: BTreeMap<Holes, f64>,
     pub(super) solved: usize,
@@ -56,6 +58,7 @@ impl<'t, 'a> Search<'t, 'a> {
             count,
             follower: Follower::new(task),
             known: BTreeMap::new(),
+            seconds: Vec::new(),
             rested: BTreeMap::new(),
             solved: 0,
             rounds: 0,
@@ -75,7 +78,7 @@ impl<'t, 'a> Search<'t, 'a> {
 
     /// What was found, nearest first.
     pub(super) fn found(&self) -> Vec<&Candidate> {
-        let mut all: Vec<_> = self.known.values().collect();
+        let mut all: Vec<_> = self.known.values().chain(&self.seconds).collect();
         all.sort_by(|a, b| a.value.total_cmp(&b.value).then_with(|| a.holes.cmp(&b.holes)));
         all
     }
@@ -91,8 +94,11 @@ impl<'t, 'a> Search<'t, 'a> {
         let Some(candidate) = polished else { return false };
         let better = candidate.value < NEARER * least;
         let known = self.known.get(holes).is_some_and(|known| known.value <= candidate.value);
-        if !known {
-            self.known.insert(holes.clone(), candidate);
+        let second =
+            if known { Some(candidate) } else { self.known.insert(holes.clone(), candidate) };
+        // The rod may not follow the displacements of the nearest.
+        if self.few() {
+            self.seconds.extend(second);
         }
         better
     }
