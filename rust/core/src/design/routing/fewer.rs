@@ -5,6 +5,8 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use nalgebra::Vector3;
+
 use super::design::{Answer, Begin, Design};
 use super::judge::Judge;
 use super::posed::Posed;
@@ -47,7 +49,9 @@ impl Lifted {
         azimuths.insert(new, along(&azimuths[donor]));
         let mut own = task.radii[new].clone();
         if let Some((low, high)) = task.settings.radius {
-            own.iter_mut().for_each(|radius| *radius = radius.clamp(low, high));
+            for radius in &mut own {
+                *radius = radius.clamp(low, high);
+            }
         }
         radii.insert(new, own);
         let end = best.point.azimuths[donor].len() - 1;
@@ -155,7 +159,7 @@ impl<'p> Designs<'p> {
             radii: robot
                 .paths()
                 .iter()
-                .map(|path| path.holes.iter().map(|h| h.norm()).collect())
+                .map(|path| path.holes.iter().map(Vector3::norm).collect())
                 .collect(),
         };
         // Bounds that do not bind must not cost anything: what is nearest without them is.
