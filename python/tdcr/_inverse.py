@@ -90,9 +90,9 @@ def inverse(
     Raises
     ------
     InvalidInput
-        Both or neither of target and positions, one that is not finite or no rigid motion, bounds or a start that do not fit the robot,
-        a model without inverse, proportional tendons, obstacles or loads for another model than
-        the rod.
+        Both or neither of target and positions, one that is not finite, a frame that is no rigid
+        motion, bounds or a start that do not fit the robot, a model without inverse, proportional
+        tendons, obstacles, loads or positions for another model than the rod.
     Exception
         What the function of a `SignedDistance` raises.
 

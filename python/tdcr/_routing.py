@@ -129,8 +129,9 @@ def routing(
     Raises
     ------
     InvalidInput
-        Places of another shape or number, not finite, or whose first of n + 1 is not the base; a
-        curve that is too short; a robot without tendons; bounds or a start that do not fit it.
+        Places of another shape or number, not finite, more than 1e6 lengths away, or whose first of
+        n + 1 is not the base; a curve that is too short; a robot without tendons; bounds or a start
+        that do not fit it.
     TypeError
         A value of another type.
     KeyboardInterrupt
@@ -179,7 +180,8 @@ def routing_batch(
     Raises
     ------
     InvalidInput
-        As `routing`, and for a number of threads that is not positive.
+        As `routing`, before any row is solved and naming the row; what has no rows; a number of
+        threads that is not positive.
     TypeError
         A value of another type.
     KeyboardInterrupt
@@ -187,8 +189,7 @@ def routing_batch(
     """
     settings = _checked(robot, settings)
     pairs = _pairs(robot, bounds)
-    kind = settings.rod.subsegment
-    rows = [wanted_places(robot, row, kind) for row in target_positions]
+    rows = _rows(robot, target_positions, settings.rod.subsegment)
     with told(progress, "routings", len(rows)) as tell:
         answers = _core._routing_batch(robot, rows, pairs, settings, threads, tell)
     return [
@@ -211,14 +212,42 @@ def _pairs(robot: Robot, bounds: tuple[ArrayLike, ArrayLike] | None) -> tuple[Ar
         return None
     count = len(robot.tendons)
     try:
-        lower, upper = (
-            np.broadcast_to(np.asarray(side, dtype=np.float64), (count,)).copy() for side in bounds
-        )
-    except ValueError:
+        lower, upper = (_side(side, count) for side in bounds)
+    except (TypeError, ValueError):
         raise InvalidInput(
             f"bounds: expected a pair (lower, upper) of numbers or of {count} numbers each, one "
-            f"per tendon, got {bounds!r}",
+            f"per tendon, infinite for no bound, got {bounds!r}",
             "bounds",
         ) from None
-    lower.flags.writeable = upper.flags.writeable = False
     return lower, upper
+
+
+def _side(values: ArrayLike, count: int) -> Array:
+    given = np.asarray(values)
+    if given.dtype.kind not in "fiu":  # None would become NaN, and text a number
+        raise TypeError(given.dtype)
+    side = np.broadcast_to(given.astype(np.float64), (count,)).copy()
+    side.flags.writeable = False
+    return side
+
+
+def _rows(robot: Robot, given: Iterable[ArrayLike | Curve], subsegment: str) -> list[Array]:
+    """Wanted places of every row; what is wrong with one names it."""
+    try:
+        rows = list(given)
+    except TypeError:
+        raise InvalidInput(
+            "target_positions: expected wanted shapes, one per row: shape (B, n, 3) or "
+            f"(B, n + 1, 3), or an iterable of curves, got {type(given).__name__}",
+            "target_positions",
+        ) from None
+    places = []
+    for i, row in enumerate(rows):
+        try:
+            places.append(wanted_places(robot, row, subsegment))
+        except InvalidInput as error:
+            raise InvalidInput(f"{error} in row {i}", error.argument) from None
+        except TypeError as error:
+            message = f"{error} in row {i}"
+            raise TypeError(message) from None
+    return places

@@ -128,6 +128,105 @@ def test_all_routings_of_a_small_robot():
     assert held.rms >= answer.rms
 
 
+@pytest.mark.parametrize(
+    ("count", "places", "least"),
+    [
+        (12, [[-0.0065, -0.0073, 0.0045]], 3.65665e-3),
+        (4, [[0.0103, 0.0089, 0.0178], [-0.0097, -0.0064, 0.0027]], 1.575880e-2),
+    ],
+)
+def test_every_valley_of_every_routing_is_looked_into(count, places, least):
+    n = len(places)
+    robot = tdcr.Robot(tdcr.Backbone(0.02 * n, n), [tdcr.Tendon(0.0, 0.008)])
+    answer = design.routing(robot, places, settings=design.RoutingSettings(holes=count))
+    assert answer.optimality == "exhaustive"
+    assert answer.rms <= least * (1 + 1e-5)
+
+
+def line(lean, azimuth, start=0.0):
+    """Places on a straight line."""
+    along = [np.sin(lean) * np.cos(azimuth), np.sin(lean) * np.sin(azimuth), np.cos(lean)]
+    return [start, 0.0, 0.0] + np.linspace(0.02, LENGTH, 9)[:, None] * along
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        line(1.5, 0.7),
+        line(2.0, 0.0),
+        line(2.8, 0.7),
+        line(0.5, np.pi, 0.05),
+        line(1.2, np.pi, 0.05),
+    ],
+)
+def test_more_tendons_are_never_worse(places):
+    one, two = (design.routing(blank(tendons), places) for tendons in (1, 2))
+    assert two.rms <= one.rms * (1 + 1e-8)
+    assert one.status == two.status == "unreachable"
+    assert 0 <= two.gap < 0.01
+    unlike = [tdcr.Tendon(0.0, 0.008), tdcr.Tendon(0.0, 0.006, end=7)]
+    both = design.routing(tdcr.Robot(tdcr.Backbone(LENGTH, 9), unlike), places)
+    assert both.rms <= one.rms * (1 + 1e-8)
+
+
+def test_bounds_that_do_not_bind_cost_nothing(known):
+    draw = np.random.default_rng(2)
+    for noise in (1e-3, 4e-3):
+        for _ in range(4):
+            places = known.positions[1:] + draw.uniform(-noise, noise, (9, 3))
+            free = design.routing(blank(), places)
+            held = design.routing(blank(), places, bounds=(-0.025, 0.0))
+            assert -0.025 < free.displacements[0] < 0
+            assert held.rms == free.rms
+
+
+def test_the_answer_follows_its_displacements_if_any_does():
+    draw = np.random.default_rng(4)
+    shapes = [draw.normal(0.0, 0.1, (9, 3)) for _ in range(4)] + [np.full((9, 3), 1e3)]
+    for places in shapes:
+        for bounds in (None, (-0.2, -0.19)):
+            answer = design.routing(blank(), places, bounds=bounds)
+            assert answer.status == "unreachable"
+            assert answer.shape.ok
+            assert 0 <= answer.gap < LENGTH
+
+
+@pytest.mark.parametrize("tendons", [1, 2])
+def test_places_behind_the_base_are_told(tendons):
+    places = line(np.pi, 0.0)
+    answer = design.routing(blank(tendons), places)
+    assert answer.rms < 0.05
+    bent = design.prebend(blank(tendons), places, [0.0] * tendons)
+    for message in (answer.message, bent.message):
+        assert "disk 1 would be behind disk 0" in message
+        assert "180.0 deg off the base's z axis" in message
+
+
+def test_two_tendons_do_not_depend_on_last_bits():
+    places = routed([HOLES, [6, 6, 7, 8, 8, 9, 10, 10, 9, 9]], [-0.008, -0.006]).positions[1:]
+    places = places + np.random.default_rng(1).uniform(-1e-3, 1e-3, (9, 3))
+    answer = design.routing(blank(2), places)
+    base = np.eye(4)
+    turn = tdcr.Backbone(1.0, 1, rest=[[0.4, -0.8, 1.1]])
+    base[:3, :3] = tdcr.Robot(turn, []).rest_frames[1, :3, :3]
+    base[:3, 3] = [0.3, -2.0, 0.7]
+    moved = design.routing(blank(2, base=base), places @ base[:3, :3].T + base[:3, 3])
+    assert moved.holes == answer.holes
+    assert moved.rms == pytest.approx(answer.rms, rel=1e-8)
+    spun = places @ np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    spun = design.routing(blank(2), spun)
+    assert spun.holes == tuple(tuple((h + 3) % 12 for h in own) for own in answer.holes)
+    unlike = [tdcr.Tendon(0.0, 0.008), tdcr.Tendon(0.0, 0.006, end=7)]
+    one, other = (
+        design.routing(tdcr.Robot(tdcr.Backbone(LENGTH, 9), own), places)
+        for own in (unlike, unlike[::-1])
+    )
+    assert one.holes == other.holes[::-1]
+    # At rest: a search that starts with the answer finds nothing nearer.
+    again = design.routing(blank(2), places, start=answer)
+    assert again.rms == pytest.approx(answer.rms, rel=1e-8)
+
+
 def test_two_tendons_come_near():
     shape = routed([HOLES, [6, 6, 7, 8, 8, 9, 10, 10, 9, 9]], [-0.008, -0.006])
     answer = design.routing(blank(2), shape.positions)
@@ -201,12 +300,27 @@ SHORT = tdcr.Robot(tdcr.Backbone(0.1, 5), [tdcr.Tendon(0.0, 0.008)])
         ("bounds", blank(), NINE, {"bounds": ([-0.01] * 2, [0.0] * 2)}),
         ("bounds", blank(), NINE, {"bounds": (0.0, -0.01)}),
         ("bounds", blank(), NINE, {"bounds": (np.nan, 0.0)}),
+        ("bounds", blank(), NINE, {"bounds": 3}),
+        ("bounds", blank(), NINE, {"bounds": (None, None)}),
+        ("bounds", blank(), NINE, {"bounds": ("1", "2")}),
+        ("target_positions", blank(), np.full((9, 3), 1e200), {}),
     ],
 )
 def test_bad_input_names_the_argument(argument, robot, targets, options):
     with pytest.raises(tdcr.InvalidInput, match=r"expected .*got ") as caught:
         design.routing(robot, targets, **options)
     assert caught.value.argument == argument
+
+
+@pytest.mark.parametrize("bad", [NINE[1:], np.full((9, 3), np.nan), np.full((9, 3), 1e200)])
+def test_bad_rows_are_named(bad):
+    with pytest.raises(tdcr.InvalidInput, match=r"expected .*got .* in row 1") as caught:
+        design.routing_batch(blank(), [NINE, bad])
+    assert caught.value.argument == "target_positions"
+    for none in (None, 3):
+        with pytest.raises(tdcr.InvalidInput, match=r"expected wanted shapes.*got ") as caught:
+            design.routing_batch(blank(), none)
+        assert caught.value.argument == "target_positions"
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 //! Why places cannot be those of a robot's disks, whatever its rest shape.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::Vector3;
 
 use super::curve::{mirrored, piece_length};
@@ -19,10 +21,19 @@ pub(super) fn hindrance(
     for (i, (target, length)) in targets.iter().zip(robot.backbone().lengths()).enumerate() {
         let chord = target - place;
         let piece = piece_length(kind, &tangent, &chord);
-        if (piece / length - 1.0).abs() > off {
-            let angle = tangent.cross(&chord).norm().atan2(tangent.dot(&chord)).to_degrees();
+        let half = tangent.cross(&chord).norm().atan2(tangent.dot(&chord));
+        // A subsegment bends by twice the angle of its chord, and by half a turn at most.
+        let behind = half >= FRAC_PI_2;
+        if behind || (piece / length - 1.0).abs() > off {
+            let angle = half.to_degrees();
             let (next, size) = (i + 1, chord.norm());
             let axis = if i == 0 { "the base's z axis" } else { "the tangent there" };
+            if behind {
+                return format!(
+                    ": disk {next} would be behind disk {i}: from there it is {size:.6} m, {angle:.1} deg off \
+                     {axis}; a subsegment bends by no more than half a turn"
+                );
+            }
             let shape = if kind == Subsegment::Link { "a link" } else { "an arc" };
             return format!(
                 ": from disk {i} to disk {next} it is {size:.6} m, {angle:.1} deg off {axis}, which takes \

@@ -31,6 +31,8 @@ pub(super) struct Leaf {
     pub(super) tensions: Vec<f64>,
     /// Sum of squared distances there, to first order of the places \[m²\].
     pub(super) value: f64,
+    /// Half its slopes at the window's tensions.
+    pub(super) slope: Vec<f64>,
 }
 
 impl Node {
@@ -53,13 +55,8 @@ pub(super) struct Window<'w> {
     pub(super) width: &'w [f64],
 }
 
-/// The routings of a field, nearest first, as many as the beam is wide; and whether none was left out. Nothing
-/// when it was stopped.
-pub(super) fn search(
-    task: &Task<'_>,
-    field: &Field,
-    window: &Window<'_>,
-) -> Option<(Vec<Leaf>, bool)> {
+/// The routings of a field, nearest first, as many as the beam is wide. Nothing when it was stopped.
+pub(super) fn search(task: &Task<'_>, field: &Field, window: &Window<'_>) -> Option<Vec<Leaf>> {
     let count = task.tendons();
     let upper = window.width;
     let tensions = window.tensions.iter().zip(upper);
@@ -75,7 +72,7 @@ pub(super) fn search(
     };
     let mut levels: Vec<Vec<Node>> = vec![(0..field.choices[0].len()).map(root).collect()];
     let shares = task.shares();
-    let (mut whole, mut child) = (true, root(0));
+    let mut child = root(0);
     for (i, target) in task.targets.iter().enumerate() {
         let nodes = levels.last()?;
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
@@ -96,7 +93,6 @@ pub(super) fn search(
         };
         let width = task.settings.beam_width;
         if found.len() > width {
-            whole = false;
             found.select_nth_unstable_by(width, order);
             found.truncate(width);
         }
@@ -116,9 +112,10 @@ pub(super) fn search(
         sums.penalise(task, 1.0);
         let value = sums.least(&lower, upper, &mut change);
         let tensions = window.tensions.iter().zip(&change).map(|(t, c)| t + c).collect();
-        leaves.push(Leaf { holes: trace(field, &levels, place), tensions, value });
+        let holes = trace(field, &levels, place);
+        leaves.push(Leaf { holes, tensions, value, slope: sums.slope });
     }
-    Some((leaves, whole))
+    Some(leaves)
 }
 
 /// The holes that led to a place of the last level.

@@ -3,7 +3,11 @@
 
 mod beam;
 mod design;
+mod every;
+mod fewer;
+mod judge;
 mod polish;
+mod posed;
 mod relax;
 mod search;
 mod settings;
@@ -11,6 +15,7 @@ mod starts;
 mod sums;
 mod table;
 mod task;
+mod told;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,8 +24,10 @@ use nalgebra::Vector3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use self::design::Design;
+use self::fewer::Designs;
+use self::posed::{Posed, radii};
 use self::task::Task;
+use self::told::told;
 use crate::batch::Control;
 use crate::error::InvalidInput;
 use crate::inverse::Range;
@@ -30,6 +37,9 @@ use crate::shape::Shape;
 use crate::status::Status;
 
 pub use settings::RoutingSettings;
+
+/// Wanted places are no further from the base than so many lengths: beyond, distances to all shapes round to the same.
+const FARTHEST: f64 = 1e6;
 
 /// What is known about the nearest routing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,10 +126,11 @@ pub fn routing_stopped_by(
     settings.validate()?;
     check(robot, targets, bounds, start)?;
     let plan = Plan::new(robot, settings.rod)?;
-    let paths = robot.paths().iter();
-    let radii = paths.map(|path| path.holes.iter().map(Vector3::norm).collect()).collect();
+    let radii = (0..robot.tendons().len()).map(|k| radii(robot, k)).collect();
     let task = Task { robot, targets, bounds, settings, stop, plan, radii };
-    Design::new(&task, start).run()
+    let posed = Posed::new(robot, targets, bounds, start, settings)?;
+    let (answer, counted) = Designs::new(&posed, stop).run()?;
+    told(&task, &posed, &answer, counted)
 }
 
 fn check(
@@ -133,6 +144,14 @@ fn check(
         return Err(InvalidInput::new("robot", "at least one tendon to route", "none"));
     }
     super::check_targets(robot, targets)?;
+    let (base, far) = (robot.base().translation, FARTHEST * robot.backbone().total_length());
+    if let Some(i) = targets.iter().position(|target| (target - base).amax() > far) {
+        let expected = format!(
+            "places within {far:.3e} m of the base, {FARTHEST:.0e} times the robot's length"
+        );
+        let got = format!("{:?} for disk {}", targets[i].as_slice(), i + 1);
+        return Err(InvalidInput::new("target_positions", expected, got));
+    }
     if let Some(bounds) = bounds {
         let (lower, upper) = bounds.values();
         for count in [lower.len(), upper.len()] {
@@ -161,7 +180,7 @@ fn check(
 /// Rows of wanted places, each as alone, on a pool; nothing when it was stopped.
 ///
 /// # Errors
-/// As [`routing`], of the first row that has one.
+/// As [`routing`], of the first row that has one, before any is solved and naming the row.
 pub fn routing_rows(
     robot: &Robot,
     rows: &[Vec<Vector3<f64>>],
@@ -171,6 +190,10 @@ pub fn routing_rows(
     control: &Control,
 ) -> Result<Option<Vec<Routed>>, InvalidInput> {
     let stop = &control.stop;
+    for (i, targets) in rows.iter().enumerate() {
+        check(robot, targets, bounds, None)
+            .map_err(|error| InvalidInput { got: format!("{} in row {i}", error.got), ..error })?;
+    }
     let row = |targets: &Vec<Vector3<f64>>| {
         let answer = routing_stopped_by(robot, targets, bounds, None, settings, stop);
         control.done.fetch_add(1, Ordering::Relaxed);

@@ -18,6 +18,8 @@ pub(super) struct Candidate {
 /// Steps at most; a change of the value by less than this share ends them.
 const STEPS: usize = 40;
 const HEADWAY: f64 = 1e-10;
+/// A bottom is known to the width of its bracket halved so often.
+const HALVES: usize = 40;
 /// Places within this share of the length cannot be told apart.
 const ROUNDING: f64 = 1e-14;
 
@@ -81,6 +83,35 @@ impl Follower {
         Some(Placed { sums, strains })
     }
 
+    /// Where between two tensions the value of a routing of one tendon ends to fall, or the last at which it has a
+    /// shape.
+    pub(super) fn bottom(
+        &mut self,
+        task: &Task<'_>,
+        holes: &Holes,
+        count: usize,
+        (mut low, mut high): (f64, f64),
+    ) -> f64 {
+        self.route(task, holes, count);
+        for _ in 0..HALVES {
+            let middle = 0.5 * (low + high);
+            if self.place(task, &[middle]).is_some_and(|placed| placed.sums.slope[0] < 0.0) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
+    fn route(&mut self, task: &Task<'_>, holes: &Holes, count: usize) {
+        for (i, (stage, near)) in self.stages.iter_mut().zip(&mut self.near).enumerate() {
+            let place = |k, disk: usize| task.hole(k, disk, holes[disk][k], count);
+            stage.route(|k| (place(k, i), place(k, i + 1)));
+            near.clear();
+        }
+    }
+
     /// Gauss-Newton steps on the tensions, none of which becomes negative. Nothing where the routing has no
     /// shape under the first ones.
     pub(super) fn polish(
@@ -90,11 +121,7 @@ impl Follower {
         count: usize,
         tensions: &[f64],
     ) -> Option<Candidate> {
-        for (i, (stage, near)) in self.stages.iter_mut().zip(&mut self.near).enumerate() {
-            let place = |k, disk: usize| task.hole(k, disk, holes[disk][k], count);
-            stage.route(|k| (place(k, i), place(k, i + 1)));
-            near.clear();
-        }
+        self.route(task, holes, count);
         let mut tensions = tensions.to_vec();
         let mut here = self.place(task, &tensions)?;
         let least = (ROUNDING * task.length()).powi(2);

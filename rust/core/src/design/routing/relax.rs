@@ -27,6 +27,18 @@ pub(super) struct Freedom {
     pub(super) pulls: Pulls,
 }
 
+impl Freedom {
+    /// Holes stay where they are.
+    pub(super) const fn of_pulls() -> Self {
+        Self { azimuths: false, radii: None, pulls: Pulls::Tensions }
+    }
+
+    /// All that the task leaves open.
+    pub(super) fn whole(task: &Task<'_>) -> Self {
+        Self { azimuths: true, radii: task.settings.radius, pulls: Pulls::Tensions }
+    }
+}
+
 /// A routed robot and its shape.
 #[derive(Clone, Debug)]
 pub(super) struct Point {
@@ -96,6 +108,17 @@ impl Point {
         let state = rod.take_state(work);
         let value = task.value(&state);
         Ok(Some(Self { azimuths, radii, robot, state, displacements, value }))
+    }
+
+    /// Its displacements within their bounds; what is slack is held at its rest length where that leaves it slack.
+    pub(super) fn pulls(&self, task: &Task<'_>) -> Vec<f64> {
+        let own = self.displacements.iter().zip(&self.state.tensions).enumerate();
+        let bounded = |(k, (pull, tension)): (usize, (&f64, &f64))| {
+            let (low, high) = task.bound(k);
+            let pull = if *tension > 0.0 { *pull } else { pull.max(0.0) };
+            pull.clamp(low, high)
+        };
+        own.map(bounded).collect()
     }
 
     fn met(&self, task: &Task<'_>, share: f64) -> bool {

@@ -1,11 +1,12 @@
 //! Which holes: beams over tensions, and around what is best so far.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 use super::beam::{Leaf, Window, search};
 use super::polish::{Candidate, Follower};
 use super::table::{Choice, Field};
-use super::task::{Holes, Task};
+use super::task::{Holes, PerHole, Task};
 use crate::error::InvalidInput;
 
 /// Whether what a search has found is enough.
@@ -24,22 +25,30 @@ const POLISHED: usize = 12;
 const NEAR: f64 = 0.03;
 const WIDE: f64 = 0.3;
 const NEARER: f64 = 1.0 - 1e-6;
+/// Tensions below this share of the largest are given that room.
+const IDLE: f64 = 0.1;
+/// Turns that tell two azimuths apart.
+const SAME: f64 = 1e-9;
 /// Tendons whose neighbouring holes are searched all at once, at most: three each make 27 choices per disk.
 const JOINT: usize = 3;
 
 /// What was found so far.
 pub(super) struct Search<'t, 'a> {
-    task: &'t Task<'a>,
+    pub(super) task: &'t Task<'a>,
     /// Holes per disk.
     pub(super) count: usize,
-    follower: Follower,
+    pub(super) follower: Follower,
     /// Every routing whose tensions were polished.
     known: BTreeMap<Holes, Candidate>,
-    solved: usize,
+    /// Other valleys of the same routings, where all are looked at.
+    seconds: Vec<Candidate>,
+    /// Routings none of whose neighbours is nearer, and their values.
+    rested: BTreeMap<Holes, f64>,
+    pub(super) solved: usize,
     /// Rounds of beams.
     pub(super) rounds: usize,
-    /// No routing was left out over all tensions.
-    pub(super) whole: bool,
+    /// Least value of what was left out, where all routings were looked at.
+    pub(super) left_out: Option<f64>,
 }
 
 impl<'t, 'a> Search<'t, 'a> {
@@ -49,9 +58,11 @@ impl<'t, 'a> Search<'t, 'a> {
             count,
             follower: Follower::new(task),
             known: BTreeMap::new(),
+            seconds: Vec::new(),
+            rested: BTreeMap::new(),
             solved: 0,
             rounds: 0,
-            whole: false,
+            left_out: None,
         }
     }
 
@@ -67,7 +78,7 @@ impl<'t, 'a> Search<'t, 'a> {
 
     /// What was found, nearest first.
     pub(super) fn found(&self) -> Vec<&Candidate> {
-        let mut all: Vec<_> = self.known.values().collect();
+        let mut all: Vec<_> = self.known.values().chain(&self.seconds).collect();
         all.sort_by(|a, b| a.value.total_cmp(&b.value).then_with(|| a.holes.cmp(&b.holes)));
         all
     }
@@ -83,18 +94,20 @@ impl<'t, 'a> Search<'t, 'a> {
         let Some(candidate) = polished else { return false };
         let better = candidate.value < NEARER * least;
         let known = self.known.get(holes).is_some_and(|known| known.value <= candidate.value);
-        if !known {
-            self.known.insert(holes.clone(), candidate);
+        let second =
+            if known { Some(candidate) } else { self.known.insert(holes.clone(), candidate) };
+        // The rod may not follow the displacements of the nearest.
+        if self.few() {
+            self.seconds.extend(second);
         }
         better
     }
 
-    /// Polishes the nearest leaves, all of them where none was left out; whether one of them is the best.
-    fn keep(&mut self, (leaves, whole): (Vec<Leaf>, bool)) -> bool {
+    /// Polishes the nearest leaves; whether one of them is the best.
+    fn keep(&mut self, leaves: Vec<Leaf>) -> bool {
         self.rounds += 1;
-        let most = if whole { leaves.len() } else { POLISHED };
         let mut better = false;
-        for leaf in leaves.into_iter().take(most) {
+        for leaf in leaves.into_iter().take(POLISHED) {
             let known = self.known.get(&leaf.holes).map_or(f64::INFINITY, |known| known.value);
             if leaf.value < 0.5 * known && !self.task.stopped() {
                 better |= self.try_holes(&leaf.holes, &leaf.tensions);
@@ -104,7 +117,7 @@ impl<'t, 'a> Search<'t, 'a> {
     }
 
     /// What all disks may have: `own` of every tendon that comes by.
-    fn choices(&self, own: impl Fn(usize, usize) -> Vec<usize>) -> Vec<Vec<Choice>> {
+    pub(super) fn choices(&self, own: impl Fn(usize, usize) -> Vec<usize>) -> Vec<Vec<Choice>> {
         let tendons = self.task.tendons();
         let disk = |i: usize| {
             let mut all: Vec<Choice> = vec![Vec::new()];
@@ -123,7 +136,9 @@ impl<'t, 'a> Search<'t, 'a> {
     /// One round among choices, at tensions and within a share of them.
     fn round(&mut self, choices: Vec<Vec<Choice>>, tensions: &[f64], share: f64) -> bool {
         let mut field = Field::new(self.task, choices, self.count);
-        let width: Vec<f64> = tensions.iter().map(|t| share * t).collect();
+        // What is hardly pulled may be by as much as the others.
+        let most = tensions.iter().fold(0.0_f64, |most, t| most.max(*t));
+        let width: Vec<f64> = tensions.iter().map(|t| share * t.max(IDLE * most)).collect();
         let found = if field.fill(self.task, tensions) {
             search(self.task, &field, &Window { tensions, width: &width })
         } else {
@@ -148,7 +163,7 @@ impl<'t, 'a> Search<'t, 'a> {
         let mut tension = (FROM * mean).min(last);
         let all = self.choices(|_, _| (0..self.count).collect());
         let mut field = Field::new(task, all.clone(), self.count);
-        let (mut whole, mut done) = (true, false);
+        let mut done = false;
         loop {
             let width = [tension * (RATIO - 1.0)];
             let window = Window { tensions: &[tension], width: &width };
@@ -156,13 +171,11 @@ impl<'t, 'a> Search<'t, 'a> {
             let Some(found) = filled.then(|| search(task, &field, &window)).flatten() else {
                 break;
             };
-            whole &= found.1;
             if self.keep(found) && enough(self)? {
                 done = true;
                 break;
             }
             if tension >= last {
-                self.whole = whole;
                 break;
             }
             tension = (tension * RATIO).min(last);
@@ -179,8 +192,8 @@ impl<'t, 'a> Search<'t, 'a> {
         Ok(done)
     }
 
-    /// Several tendons, from a routing: rounds over each one's holes, and over neighbouring holes of all at once,
-    /// until none of them brings it nearer.
+    /// Several tendons, from a routing: rounds over neighbouring holes of all at once, and over each one's holes, in
+    /// turn, until none of them brings it nearer.
     pub(super) fn around(
         &mut self,
         start: &Holes,
@@ -191,49 +204,81 @@ impl<'t, 'a> Search<'t, 'a> {
         let first = self.follower.polish(task, start, count, tensions);
         let Some(mut here) = first else { return Ok(false) };
         self.known.entry(start.clone()).or_insert_with(|| here.clone());
-        let joint = task.tendons() <= JOINT;
-        for _ in 0..task.settings.max_iterations {
-            let before = here.value;
-            for k in (0..task.tendons() + usize::from(joint)).rev() {
-                if task.stopped() {
-                    return Ok(false);
-                }
-                let holes = here.holes.clone();
-                let choices = self.choices(|disk, tendon| {
-                    let own = holes[disk][tendon];
-                    if k == task.tendons() {
-                        let mut near = vec![own, (own + 1) % count, (own + count - 1) % count];
-                        near.sort_unstable();
-                        near.dedup();
-                        near
-                    } else if k == tendon {
-                        (0..count).collect()
-                    } else {
-                        vec![own]
-                    }
-                });
-                // What is known elsewhere is no neighbour of what is here: the round's own best counts.
-                let known = std::mem::take(&mut self.known);
-                self.round(choices, &here.tensions, WIDE);
-                let best = self.best().cloned();
-                let found = std::mem::replace(&mut self.known, known);
-                for (holes, candidate) in found {
-                    let known = self.known.get(&holes);
-                    if known.is_none_or(|known| candidate.value < known.value) {
-                        self.known.insert(holes, candidate);
-                    }
-                }
-                if let Some(best) = best.filter(|best| best.value < NEARER * here.value) {
+        let kinds = task.tendons() + usize::from(task.tendons() <= JOINT);
+        let mut still = 0;
+        for turn in 0..kinds.saturating_mul(task.settings.max_iterations) {
+            let rested = self.rested.get(&here.holes);
+            if task.stopped() || rested.is_some_and(|value| here.value >= NEARER * value) {
+                return Ok(false);
+            }
+            match self.beside(&here, kinds - 1 - turn % kinds) {
+                Some(best) => {
                     here = best;
+                    still = 0;
+                    if enough(self)? {
+                        return Ok(true);
+                    }
                 }
+                None => still += 1,
             }
-            if enough(self)? {
-                return Ok(true);
-            }
-            if here.value >= NEARER * before {
+            if still == kinds {
+                self.rested.insert(here.holes, here.value);
                 break;
             }
         }
-        Ok(false)
+        enough(self)
     }
+
+    /// What is nearer than a routing among its neighbours: with other holes of one tendon, or beyond the last, with
+    /// neighbouring holes of all.
+    fn beside(&mut self, here: &Candidate, kind: usize) -> Option<Candidate> {
+        let (task, count) = (self.task, self.count);
+        let choices = self.choices(|disk, tendon| {
+            let own = here.holes[disk][tendon];
+            if kind == task.tendons() {
+                let mut near = vec![own, (own + 1) % count, (own + count - 1) % count];
+                near.sort_unstable();
+                near.dedup();
+                near
+            } else if kind == tendon {
+                (0..count).collect()
+            } else {
+                vec![own]
+            }
+        });
+        // What is known elsewhere is no neighbour of what is here: the round's own best counts.
+        let known = std::mem::take(&mut self.known);
+        self.round(choices, &here.tensions, WIDE);
+        let best = self.best().cloned();
+        let found = std::mem::replace(&mut self.known, known);
+        for (holes, candidate) in found {
+            let known = self.known.get(&holes);
+            if known.is_none_or(|known| candidate.value < known.value) {
+                self.known.insert(holes, candidate);
+            }
+        }
+        best.filter(|best| best.value < NEARER * here.value)
+    }
+}
+
+/// The nearest of so many holes, from disk to disk no further on than a tendon may.
+pub(super) fn numbers(task: &Task<'_>, azimuths: &PerHole, count: usize) -> Holes {
+    let mut holes = vec![vec![0; task.tendons()]; task.disks()];
+    for (k, own) in azimuths.iter().enumerate() {
+        let mut last = None;
+        for (disk, azimuth) in own.iter().enumerate() {
+            // Holes that are as far off but for a rounding are equally near.
+            let far = |hole: &usize| {
+                let turns = (azimuth - task.azimuth(*hole, count)) / TAU;
+                ((turns - turns.round()).abs() / SAME).round()
+            };
+            let nearest = (0..count)
+                .filter(|hole| last.is_none_or(|last| task.allows(last, *hole, count)))
+                .min_by(|a, b| far(a).total_cmp(&far(b)));
+            let hole = nearest.unwrap_or(0);
+            holes[disk][k] = hole;
+            last = Some(hole);
+        }
+    }
+    holes
 }

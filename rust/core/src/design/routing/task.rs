@@ -1,10 +1,10 @@
 //! What a routing design is asked for, and robots with the holes that it tries.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DVector, Vector2, Vector3};
 
 use super::settings::RoutingSettings;
 use crate::error::InvalidInput;
@@ -164,9 +164,10 @@ impl Task<'_> {
         for (i, target) in self.targets.iter().enumerate() {
             let chord = frame.rotation.tr_mul(&(target - frame.translation));
             let across = chord.xy().norm();
-            let angle = 2.0 * across.atan2(chord.z);
-            let turn =
-                Vector3::new(-chord.y, chord.x, 0.0) * (angle / across.max(f64::MIN_POSITIVE));
+            // No subsegment bends beyond half a turn; what is straight behind may be on any side.
+            let angle = (2.0 * across.atan2(chord.z)).min(PI);
+            let side = if across > 0.0 { chord.xy() / across } else { Vector2::x() };
+            let turn = Vector3::new(-side.y, side.x, 0.0) * angle;
             frame.rotation *= so3::exp(&turn);
             frame.translation = *target;
             let bent = turn - self.robot.backbone().rest(i);
