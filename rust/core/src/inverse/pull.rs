@@ -225,10 +225,12 @@ impl<G> Pull<'_, G> {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)] // A test may stop where it fails.
 mod tests {
-    use nalgebra::Vector3;
+    use nalgebra::{Vector3, Vector6};
 
+    use super::super::InverseSettings;
     use super::super::Target;
     use super::super::bounds::Bounds;
+    use super::super::places::PlacesGoal;
     use super::super::rod::RodInverse;
     use super::super::rows::Inverter;
     use super::*;
@@ -306,6 +308,55 @@ mod tests {
             let contacts = pull.rod.state().unwrap().contacts;
             assert!(contacts.iter().any(|c| c.force.norm() > 0.0));
         }
+    }
+
+    /// Of the sum of squares over wanted places of some of the disks: its slope and, but for how tensions change the
+    /// stiffness, its second derivatives.
+    #[test]
+    fn derivatives_of_places_agree_with_differences() {
+        let robot = robot(48);
+        let plan = Plan::new(&robot, RodSettings::default()).unwrap();
+        let bounds = Bounds::default();
+        let settings = InverseSettings::default();
+        let inverse = RodInverse::new(&robot, &plan, &bounds, settings).unwrap();
+        let work = inverse.buffers(None);
+        let wanted = (0..6_usize).map(|i| {
+            let s = 0.2 * (i + 1) as f64 / 6.0;
+            (8 * i + 7, Vector3::new(0.3 * s, -0.4 * s, 0.8 * s))
+        });
+        let goal = PlacesGoal::new(wanted.collect(), 0.2, 1e-10);
+        let Pull { units, ranges, lengths, rod, .. } = work.pull;
+        let mut pull = Pull::new(rod, goal, lengths, units, ranges);
+        let mut at = |z: &[f64]| {
+            let (mut residual, mut jacobian) =
+                (SVector::<f64, 8>::zeros(), vec![SVector::<f64, 8>::zeros(); 4]);
+            pull.evaluate(z, &mut residual, &mut jacobian);
+            let squared = Problem::<8>::squared(&mut pull, z);
+            assert!((residual.norm_squared() - squared).abs() < 1e-15);
+            let slope: Vec<f64> = jacobian.iter().map(|column| column.dot(&residual)).collect();
+            let mut hessian: Vec<f64> =
+                (0..16).map(|i| jacobian[i / 4].dot(&jacobian[i % 4])).collect();
+            pull.add_hessian(z, &residual, &mut hessian);
+            (0.5 * squared, slope, hessian)
+        };
+        let (z, h) = ([0.9, 0.5, 0.3, 0.7], 1e-4);
+        let (_, slope, hessian) = at(&z);
+        let (mut off, mut whole) = (0.0, 0.0);
+        for b in 0..4 {
+            let mut moved = |by: f64| {
+                let mut z = z;
+                z[b] += by;
+                at(&z)
+            };
+            let (ahead, behind) = (moved(h), moved(-h));
+            assert!(((ahead.0 - behind.0) / (2.0 * h) - slope[b]).abs() < 1e-8);
+            for a in b..4 {
+                let bent = (ahead.1[a] - behind.1[a]) / (2.0 * h);
+                off += (hessian[4 * a + b] - bent).powi(2);
+                whole += bent * bent;
+            }
+        }
+        assert!(off < 0.02 * 0.02 * whole, "{}", (off / whole).sqrt());
     }
 
     /// Steps of `h`, differences right to `near`.
