@@ -2,6 +2,7 @@
 //! in `docs/design.md`.
 
 mod beam;
+mod descent;
 mod design;
 mod every;
 mod fewer;

@@ -1,8 +1,8 @@
-//! Holes of any azimuth and radius: Levenberg-Marquardt steps on exact derivatives.
+//! Holes of any azimuth and radius: shapes, unknowns and exact derivatives.
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 
 use super::task::{PerHole, Task};
 use crate::error::InvalidInput;
@@ -50,16 +50,6 @@ pub(super) struct Point {
     /// Sum of squared distances \[m²\].
     pub(super) value: f64,
 }
-
-/// Damping: where it begins, its least and its largest.
-const DAMPING: (f64, f64, f64) = (1e-4, 1e-12, 1e9);
-/// A descent ends when a step lowers the value by less than this share, or every disk is this much nearer than it
-/// has to be.
-const HEADWAY: f64 = 1e-9;
-const SPARE: f64 = 0.01;
-/// Tensions change by no more than this share in one step, and angles by this much \[rad\].
-const SHARE: f64 = 0.5;
-const TURN: f64 = 0.5;
 
 impl Point {
     /// Under tensions, in the unit of the results. Nothing if there is no such shape.
@@ -121,14 +111,14 @@ impl Point {
         own.map(bounded).collect()
     }
 
-    fn met(&self, task: &Task<'_>, share: f64) -> bool {
+    pub(super) fn met(&self, task: &Task<'_>, share: f64) -> bool {
         task.errors(&self.state)
             .iter()
             .all(|e| *e <= share * task.settings.tolerance * task.length())
     }
 
     /// The unknowns, and their bounds.
-    fn unknowns(&self, task: &Task<'_>, freedom: &Freedom) -> [Vec<f64>; 3] {
+    pub(super) fn unknowns(&self, task: &Task<'_>, freedom: &Freedom) -> [Vec<f64>; 3] {
         let (mut x, mut lower, mut upper) = (Vec::new(), Vec::new(), Vec::new());
         let mut add = |values: &[f64], low: f64, high: f64| {
             x.extend_from_slice(values);
@@ -155,7 +145,7 @@ impl Point {
     }
 
     /// The point of other unknowns.
-    fn moved(
+    pub(super) fn moved(
         &self,
         task: &Task<'_>,
         freedom: &Freedom,
@@ -250,106 +240,6 @@ impl Point {
         });
         let tensions = DMatrix::from_fn(task.tendons(), told.len(), |k, c| told[c].tensions[k]);
         (places, tensions)
-    }
-
-    /// Steps until it is no nearer, and how many.
-    pub(super) fn descend(
-        self,
-        task: &Task<'_>,
-        freedom: &Freedom,
-        steps: &mut usize,
-    ) -> Result<Self, InvalidInput> {
-        let mut here = self;
-        let mut damping = DAMPING.0;
-        for _ in 0..task.settings.max_iterations {
-            if task.stopped() || here.met(task, SPARE) {
-                break;
-            }
-            let jacobian = here.jacobian(task, freedom)?;
-            let off = task.off(&here.state);
-            let [x, lower, upper] = here.unknowns(task, freedom);
-            let (gram, gradient) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&off));
-            let mut lowered = None;
-            while damping < DAMPING.2 && !task.stopped() {
-                *steps += 1;
-                let next = bounded_step(&gram, &gradient, damping, &x, [&lower, &upper]);
-                let Some(next) = next else { break };
-                let next = Self::limited(task, freedom, &x, next);
-                if let Some(point) = here.moved(task, freedom, &next)?
-                    && point.value < here.value
-                {
-                    lowered = Some(point);
-                    break;
-                }
-                damping *= 10.0;
-            }
-            let Some(point) = lowered else { break };
-            let headway = 1.0 - point.value / here.value;
-            here = point;
-            damping = (0.1 * damping).max(DAMPING.1);
-            if headway < HEADWAY {
-                break;
-            }
-        }
-        Ok(here)
-    }
-
-    /// A step of which no angle and no tension goes too far.
-    fn limited(task: &Task<'_>, freedom: &Freedom, x: &[f64], next: Vec<f64>) -> Vec<f64> {
-        let pulls = x.len() - task.tendons();
-        let mut share = 1.0_f64;
-        for (i, (from, to)) in x.iter().zip(&next).enumerate() {
-            let most = match (i >= pulls, freedom.pulls) {
-                (true, Pulls::Tensions) => SHARE * from.max(1e-3 * x[pulls..].iter().sum::<f64>()),
-                (true, Pulls::Displacements) => f64::INFINITY,
-                (false, _) => TURN,
-            };
-            let far = (to - from).abs();
-            if far > most {
-                share = share.min(most / far);
-            }
-        }
-        x.iter().zip(next).map(|(from, to)| from + share * (to - from)).collect()
-    }
-}
-
-/// A damped step within bounds: unknowns that would leave them are held there.
-fn bounded_step(
-    gram: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    damping: f64,
-    x: &[f64],
-    [lower, upper]: [&[f64]; 2],
-) -> Option<Vec<f64>> {
-    let mut out = x.to_vec();
-    let outwards = |i: usize| {
-        (x[i] <= lower[i] && gradient[i] > 0.0) || (x[i] >= upper[i] && gradient[i] < 0.0)
-    };
-    let mut free: Vec<usize> = (0..x.len()).filter(|i| !outwards(*i)).collect();
-    let floor = 1e-12 * (0..x.len()).fold(0.0_f64, |most, i| most.max(gram[(i, i)]));
-    loop {
-        let damped = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-            let own = gram[(free[a], free[b])];
-            if a == b { own * (1.0 + damping) + floor } else { own }
-        });
-        // What is held at a bound moves there, and the others with it.
-        let held: Vec<usize> = (0..x.len()).filter(|i| !free.contains(i)).collect();
-        let right = DVector::from_fn(free.len(), |a, _| {
-            let moved = held.iter().map(|i| gram[(free[a], *i)] * (out[*i] - x[*i]));
-            -gradient[free[a]] - moved.sum::<f64>()
-        });
-        let step = damped.cholesky()?.solve(&right);
-        let count = free.len();
-        for (i, step) in free.iter().zip(step.iter()) {
-            out[*i] = x[*i] + step;
-        }
-        free.retain(|i| out[*i] >= lower[*i] && out[*i] <= upper[*i]);
-        for i in 0..x.len() {
-            out[i] = out[i].clamp(lower[i], upper[i]);
-        }
-        if free.len() == count {
-            return out.iter().all(|v| v.is_finite()).then_some(out);
-        }
     }
 }
 
