@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 import numpy as np
 
 from tdcr._core import Robot
-from tdcr._fit_checks import checked, far_off, whole
+from tdcr._fit_checks import checked, far_off, unsolved, whole
 from tdcr._measurements import Measurements
 from tdcr._status import Status
 from tdcr._value import Value
@@ -63,9 +63,10 @@ class Fit(Value):
     status: Status
     """converged, or iteration_limit."""
     message: str
-    """Whether steps still fell; whether the root mean square distance of the points fitted to is
-    more than 10 times their median, which outliers make, or more than 5 % of the robot's length:
-    then the model is not of these measurements. Empty if none of these."""
+    """Whether steps still fell; how many forward solves failed; whether the root mean square
+    distance of the points fitted to is more than 10 times their median, which outliers make, or
+    more than 5 % of the robot's length: then the model is not of these measurements. Empty if none
+    of these."""
     iterations: int
     """Levenberg-Marquardt steps."""
     seed: int
@@ -198,8 +199,9 @@ def fit(
     Raises
     ------
     InvalidInput
-        Arrays of another shape, no rows, infinite measurements, no row without gaps, fewer numbers
-        than unknowns, a parameter that is unknown, repeated or not one of the model's.
+        Arrays of another shape, no rows, infinite measurements or such that are a million lengths
+        away, no row without gaps, fewer numbers than unknowns, a parameter that is unknown,
+        repeated, not one of the model's or of tendons that the robot does not have.
     TypeError
         A value of another type.
     """
@@ -207,6 +209,8 @@ def fit(
     problem, measured = checked(
         robot, displacements, measurements, parameters, model, settings, validation
     )
+    if not isinstance(robust, bool):
+        raise TypeError(f"robust: expected a bool, got {type(robust).__name__}")
     max_iterations = whole("max_iterations", max_iterations, 1)
     seed = whole("seed", seed, 0)
     count = len(measured.points)
@@ -235,6 +239,8 @@ def fit(
     after, solved = problem.residuals(values, measured)
     status = Status.converged if done else Status.iteration_limit
     parts = [] if done else [f"still falling after {iterations} iterations"]
+    failed = int(np.count_nonzero(~solved))
+    parts += unsolved(failed, count)
     parts += far_off(np.linalg.norm(after[~held], axis=2), robot.backbone.total_length)
     for array in (after, before, measured.rows, held):
         array.flags.writeable = False
@@ -247,7 +253,7 @@ def fit(
         rows=measured.rows,
         validation=held,
         dropped=measured.dropped,
-        failed=int(np.count_nonzero(~solved)),
+        failed=failed,
         status=status,
         message="; ".join(parts),
         iterations=iterations,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from tdcr._core import Robot
-from tdcr._fit_model import NAMES, Measured, Problem
+from tdcr._fit_model import NAMES, PER_TENDON, Measured, Problem
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["checked", "far_off", "whole"]
+__all__ = ["checked", "far_off", "unsolved", "whole"]
 
 # Root mean square distances from which a fit is no description of what was measured: as a share of
 # the robot's length (calibrated models of a measured one leave 2 to 4 %), and in medians (normal
@@ -58,6 +58,13 @@ def far_off(distances: Array, length: float) -> list[str]:
     return []
 
 
+def unsolved(failed: int, rows: int) -> list[str]:
+    """Say how many rows count with a shape that is not one of the robot's."""
+    if not failed:
+        return []
+    return [f"the forward solve of {failed} of {rows} rows did not converge: see `failed`"]
+
+
 def checked(
     robot: Robot,
     displacements: ArrayLike,
@@ -70,21 +77,31 @@ def checked(
     """Check what a fit is given, but for its counts."""
     if not isinstance(robot, Robot):
         raise TypeError(f"robot: expected Robot, got {type(robot).__name__}")
+    if not isinstance(model, str):
+        raise TypeError(f"model: expected text, got {type(model).__name__}")
     if model not in ("rod", "constant_curvature"):
         message = f'model: expected "rod" or "constant_curvature", got {model!r}'
         raise InvalidInput(message, "model")
-    if not isinstance(validation, Real):
+    if isinstance(validation, bool) or not isinstance(validation, Real):
         raise TypeError(f"validation: expected a number, got {type(validation).__name__}")
     if not 0 <= validation <= 0.9:
         message = f"validation: expected a share in [0, 0.9], got {validation!r}"
         raise InvalidInput(message, "validation")
-    several = isinstance(parameters, Iterable) and not isinstance(parameters, str)
-    names = list(parameters) if several else [parameters]
+    if not isinstance(parameters, Iterable):
+        raise TypeError(f"parameters: expected names, got {type(parameters).__name__}")
+    names = [parameters] if isinstance(parameters, str) else list(parameters)
+    for name in names:
+        if not isinstance(name, str):
+            raise TypeError(f"parameters: expected names, got {type(name).__name__} among them")
     known = [n for n in NAMES if model == "rod" or n not in ("stiffness", "poisson_ratio", "rest")]
-    known_once = all(isinstance(n, str) and n in known and names.count(n) == 1 for n in names)
+    known_once = all(n in known and names.count(n) == 1 for n in names)
     if not names or not known_once:
         message = f"parameters: expected some of {known} for model {model!r}, each once"
         raise InvalidInput(f"{message}, got {parameters!r}", "parameters")
+    idle = [n for n in names if n in PER_TENDON]
+    if idle and not robot.tendons:
+        message = f"robot: expected tendons to fit {idle[0]} of, got a robot without any"
+        raise InvalidInput(message, "robot")
     for k, tendon in enumerate(robot.tendons):
         plain = tendon.routing == "angles"
         straight = plain and np.ndim(tendon.azimuth) == 0 and np.ndim(tendon.radius) == 0

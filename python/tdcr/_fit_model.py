@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["NAMES", "Measured", "Problem"]
+__all__ = ["NAMES", "PER_TENDON", "Measured", "Problem"]
 
-NAMES = ("offset", "gain", "radius", "azimuth", "stiffness", "poisson_ratio", "rest", "base")
+PER_TENDON = ("offset", "gain", "radius", "azimuth", "stiffness")
+NAMES = (*PER_TENDON, "poisson_ratio", "rest", "base")
+# Measured points are no further from the base than so many lengths.
+_FARTHEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,13 @@ class Measured:
             message = "measurements: expected finite positions, or NaN for gaps, got inf"
             raise InvalidInput(message, "measurements")
         points = points.reshape(rows, -1, 3)
+        far = np.abs(points - robot.base[:3, 3]) / robot.backbone.total_length
+        if np.nanmax(far, initial=0.0) > _FARTHEST:
+            raise InvalidInput(
+                f"measurements: expected positions within {_FARTHEST:g} lengths of the robot from "
+                f"its base [m], got one {np.nanmax(far):.3g} lengths away",
+                "measurements",
+            )
         full = ~np.isnan(points).any(axis=(1, 2)) & ~np.isnan(pulls).any(axis=1)
         if not full.any():
             message = f"measurements: expected a row without NaN, got none in {rows}"
@@ -89,7 +99,7 @@ class Problem:
     def __init__(self, robot: Robot, names: list[str], model: str, settings: Any) -> None:
         self._given, self._model, self._settings = robot, model, settings
         count, length = len(robot.tendons), robot.backbone.total_length
-        sizes = dict.fromkeys(NAMES[:5], count) | {"poisson_ratio": 1, "rest": 2, "base": 6}
+        sizes = dict.fromkeys(PER_TENDON, count) | {"poisson_ratio": 1, "rest": 2, "base": 6}
         # What changes points by about as much as a shift by the robot's length.
         units: dict[str, Any] = {
             "offset": 1 / length,

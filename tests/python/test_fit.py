@@ -261,6 +261,7 @@ BAD = [
     ("measurements", {"measurements": np.zeros((5, 8, 3))}),
     ("measurements", {"measurements": np.full((5, 3), np.nan)}),
     ("measurements", {"measurements": np.full((5, 3), np.inf)}),
+    ("measurements", {"measurements": np.full((5, 3), 1e200)}),
     ("measurements", {"measurements": [[0.0], [0.0, 1.0]]}),
     ("measurements", {"measurements": TIPS[:0], "displacements": GIVEN[:0]}),
     ("measurements", {"measurements": np.zeros((0, 9, 3)), "displacements": GIVEN[:0]}),
@@ -268,8 +269,6 @@ BAD = [
     ("displacements", {"displacements": GIVEN[:, :1]}),
     ("displacements", {"displacements": GIVEN[0]}),
     ("parameters", {"parameters": []}),
-    ("parameters", {"parameters": 3}),
-    ("parameters", {"parameters": [["gain"]]}),
     ("seed", {"seed": -1}),
     ("parameters", {"parameters": ["gain", "gain"]}),
     ("parameters", {"parameters": ["stiffness"]}),
@@ -296,11 +295,37 @@ def test_holes_of_winding_tendons_and_wrong_types():
         design.fit(winding(), TIPS, ["radius"], displacements=one)
     with pytest.raises(TypeError, match="measurements: expected numbers"):
         design.fit(winding(), [["a"] * 3] * 5, ["gain"], displacements=one)
-    for name, value in (("validation", "all"), ("seed", 0.5), ("max_iterations", "many")):
+    for name, value in (
+        ("validation", "all"),
+        ("validation", True),
+        ("seed", 0.5),
+        ("max_iterations", "many"),
+        ("robust", "no"),
+        ("model", 3),
+        ("parameters", None),
+        ("parameters", [["gain"]]),
+    ):
+        arguments = {"parameters": ["gain"], "displacements": GIVEN, name: value}
         with pytest.raises(TypeError, match=rf"{name}: expected .*got "):
-            design.fit(trunk(), TIPS, ["gain"], displacements=GIVEN, **{name: value})
+            design.fit(trunk(), TIPS, **arguments)
     with pytest.raises(TypeError, match="robot: expected Robot"):
         design.fit("robot", TIPS, ["gain"], displacements=one)
+
+
+def test_robots_without_tendons_have_none_to_fit():
+    bare = tdcr.Robot(tdcr.Backbone(0.1, 5), [])
+    measured = np.tile([0.01, 0.0, 0.1], (5, 1))
+    with pytest.raises(tdcr.InvalidInput, match=r"robot: expected tendons to fit gain .*got "):
+        design.fit(bare, measured, ["base", "gain"], displacements=np.zeros((5, 0)))
+    found = design.fit(bare, measured, ["base"], displacements=np.zeros((5, 0)))
+    assert found.rms("train") < 1e-9
+
+
+def test_rows_that_no_shape_has_are_told():
+    # Pulls by ten lengths of the robot.
+    found = design.fit(trunk(), TIPS, ["gain"], displacements=np.full((5, 2), -1.0))
+    assert found.failed == 5
+    assert "the forward solve of 5 of 5 rows did not converge" in found.message
 
 
 def test_the_measured_robot_is_fitted_as_the_guide_says():
