@@ -47,7 +47,8 @@ class Routing(Value):
     ones led to [m]: a local minimum, no bound. With `holes=None`, `rms` itself."""
     optimality: str
     """reached: every disk is in its place, nothing is nearer; exhaustive: all routings of the one
-    tendon were tried; searched: the nearest that the search met, without proof."""
+    tendon were looked at over a row of tensions, between which one may be missed; searched: the
+    nearest that the search met. Without proof, the last two."""
     iterations: int
     """Steps of descents and rounds of the search."""
     evaluations: int
@@ -211,14 +212,16 @@ def _pairs(robot: Robot, bounds: tuple[ArrayLike, ArrayLike] | None) -> tuple[Ar
     if bounds is None:
         return None
     count = len(robot.tendons)
+    message = (
+        f"bounds: expected a pair (lower, upper) of numbers or of {count} numbers each, one per "
+        f"tendon, infinite for no bound, got {bounds!r}"
+    )
     try:
         lower, upper = (_side(side, count) for side in bounds)
-    except (TypeError, ValueError):
-        raise InvalidInput(
-            f"bounds: expected a pair (lower, upper) of numbers or of {count} numbers each, one "
-            f"per tendon, infinite for no bound, got {bounds!r}",
-            "bounds",
-        ) from None
+    except TypeError:
+        raise TypeError(message) from None
+    except ValueError:
+        raise InvalidInput(message, "bounds") from None
     return lower, upper
 
 
@@ -236,11 +239,11 @@ def _rows(robot: Robot, given: Iterable[ArrayLike | Curve], subsegment: str) -> 
     try:
         rows = list(given)
     except TypeError:
-        raise InvalidInput(
+        message = (
             "target_positions: expected wanted shapes, one per row: shape (B, n, 3) or "
-            f"(B, n + 1, 3), or an iterable of curves, got {type(given).__name__}",
-            "target_positions",
-        ) from None
+            f"(B, n + 1, 3), or an iterable of curves, got {type(given).__name__}"
+        )
+        raise TypeError(message) from None
     places = []
     for i, row in enumerate(rows):
         try:

@@ -121,7 +121,7 @@ def test_all_routings_of_a_small_robot():
     settings = design.RoutingSettings(holes=6)
     answer = design.routing(robot, places, settings=settings)
     assert answer.optimality == "exhaustive"
-    assert "every routing was tried" in answer.message
+    assert "every routing was looked at over a row of tensions" in answer.message
     jump = design.RoutingSettings(holes=6, max_jump=0)
     held = design.routing(robot, places, settings=jump)
     assert len(set(held.holes[0])) == 1
@@ -300,9 +300,8 @@ SHORT = tdcr.Robot(tdcr.Backbone(0.1, 5), [tdcr.Tendon(0.0, 0.008)])
         ("bounds", blank(), NINE, {"bounds": ([-0.01] * 2, [0.0] * 2)}),
         ("bounds", blank(), NINE, {"bounds": (0.0, -0.01)}),
         ("bounds", blank(), NINE, {"bounds": (np.nan, 0.0)}),
-        ("bounds", blank(), NINE, {"bounds": 3}),
-        ("bounds", blank(), NINE, {"bounds": (None, None)}),
-        ("bounds", blank(), NINE, {"bounds": ("1", "2")}),
+        ("bounds", blank(), NINE, {"bounds": (-0.01, 0.0, 0.01)}),
+        ("bounds", blank(), NINE, {"bounds": ([[-0.01], [-0.01, 0.0]], 0.0)}),
         ("target_positions", blank(), np.full((9, 3), 1e200), {}),
     ],
 )
@@ -318,9 +317,8 @@ def test_bad_rows_are_named(bad):
         design.routing_batch(blank(), [NINE, bad])
     assert caught.value.argument == "target_positions"
     for none in (None, 3):
-        with pytest.raises(tdcr.InvalidInput, match=r"expected wanted shapes.*got ") as caught:
+        with pytest.raises(TypeError, match=r"target_positions: expected wanted shapes.*got "):
             design.routing_batch(blank(), none)
-        assert caught.value.argument == "target_positions"
 
 
 @pytest.mark.parametrize(
@@ -361,8 +359,33 @@ def test_wrong_types(known):
     for options in ({"holes": 1.5}, {"radius": 0.004, "holes": None}, {"max_jump": "two"}):
         with pytest.raises(TypeError, match=r"expected .*got "):
             design.RoutingSettings(**options)
+    for bounds in (3, (None, None), ("1", "2"), (1j, 2), (False, True)):
+        with pytest.raises(TypeError, match=r"bounds: expected a pair .*got "):
+            design.routing(blank(), NINE, bounds=bounds)
+        with pytest.raises(TypeError, match=r"bounds: expected a pair .*got "):
+            design.routing_batch(blank(), [NINE], bounds=bounds)
     with pytest.raises(tdcr.InvalidInput, match=r"threads: expected .*got 0"):
         design.routing_batch(blank(), [known.positions], threads=0)
+
+
+def test_units_do_not_matter():
+    # Two tendons and places that none reaches: descents over azimuths and tensions decide.
+    rng = np.random.default_rng(4)
+    for _ in range(2):
+        holes = [np.cumsum(rng.integers(-2, 3, 10)).tolist() for _ in range(2)]
+        found = []
+        for scale, stiff in (
+            (1.0, {}),
+            (1e3, {}),
+            (1.0, {"youngs_modulus": 60e9, "diameter": 2e-4}),
+        ):
+            tendons = [tdcr.Tendon.from_holes(np.mod(h, 12), 12, 0.008 * scale) for h in holes]
+            robot = tdcr.Robot(tdcr.Backbone(LENGTH * scale, 9, **stiff), tendons)
+            places = tdcr.forward(robot, np.array([-0.009, -0.006]) * scale).positions[1:]
+            places = places + 3e-4 * scale * np.sin(np.arange(27)).reshape(9, 3)
+            found.append(design.routing(robot, places).relaxed_rms / scale)
+        # To 1e-3, for descents end where headway does; they were apart by 4 to 14 %.
+        assert found == pytest.approx([found[0]] * 3, rel=1e-3)
 
 
 @pytest.mark.parametrize("call", ["routing(robot, places)", "routing_batch(robot, [places] * 50)"])

@@ -83,15 +83,22 @@ fn known_holes_are_found() {
 #[test]
 fn holes_of_two_tendons_come_near() {
     let mut draw = ChaCha8Rng::seed_from_u64(2);
-    let (mut drawn, mut near) = (0, 0);
+    let (mut drawn, mut near, mut reached, mut left) = (0, 0, 0, Vec::new());
     while drawn < 12 {
         let Some((_, _, places)) = known(&mut draw, 2, 2) else { continue };
         drawn += 1;
         let answer = routing(&blank(2), &places, None, None, &RoutingSettings::default()).unwrap();
         near += usize::from(answer.errors.iter().all(|e| *e <= 5e-3 * 0.18));
         assert!(answer.relaxed_rms <= answer.rms);
+        if answer.status == Status::Converged {
+            reached += 1;
+        } else {
+            left.push((1e3 * answer.rms, 1e6 * answer.relaxed_rms));
+        }
     }
-    println!("two tendons: {near} of {drawn} within 0.5 % of the length");
+    println!("two tendons: {near} of {drawn} within 0.5 % of the length, {reached} reached");
+    left.sort_by(|a, b| a.0.total_cmp(&b.0));
+    println!("the others, mm left and um by any azimuth: {left:.3?}");
     assert!(near * 10 >= drawn * 9);
 }
 

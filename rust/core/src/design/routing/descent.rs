@@ -33,11 +33,12 @@ impl Point {
             let jacobian = here.jacobian(task, freedom)?;
             let off = task.off(&here.state);
             let [x, lower, upper] = here.unknowns(task, freedom);
+            let units = freedom.units(task, x.len());
             let (gram, gradient) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&off));
             let mut lowered = None;
             while damping < DAMPING.2 && !task.stopped() {
                 *steps += 1;
-                let next = bounded_step(&gram, &gradient, damping, &x, [&lower, &upper]);
+                let next = bounded_step(&gram, &gradient, (damping, &units), &x, [&lower, &upper]);
                 let Some(next) = next else { break };
                 let next = Self::limited(task, freedom, &x, next);
                 if let Some(point) = here.moved(task, freedom, &next)?
@@ -78,11 +79,12 @@ impl Point {
     }
 }
 
-/// A damped step within bounds: unknowns that would leave them are held there.
+/// A damped step within bounds: unknowns that would leave them are held there. `units` are what they are measured in,
+/// so that what keeps a step finite where an unknown does nothing is the same in metres and in millimetres.
 fn bounded_step(
     gram: &DMatrix<f64>,
     gradient: &DVector<f64>,
-    damping: f64,
+    (damping, units): (f64, &[f64]),
     x: &[f64],
     [lower, upper]: [&[f64]; 2],
 ) -> Option<Vec<f64>> {
@@ -91,11 +93,12 @@ fn bounded_step(
         (x[i] <= lower[i] && gradient[i] > 0.0) || (x[i] >= upper[i] && gradient[i] < 0.0)
     };
     let mut free: Vec<usize> = (0..x.len()).filter(|i| !outwards(*i)).collect();
-    let floor = 1e-12 * (0..x.len()).fold(0.0_f64, |most, i| most.max(gram[(i, i)]));
+    let floor =
+        1e-12 * (0..x.len()).fold(0.0_f64, |most, i| most.max(gram[(i, i)] * units[i].powi(2)));
     loop {
         let damped = DMatrix::from_fn(free.len(), free.len(), |a, b| {
             let own = gram[(free[a], free[b])];
-            if a == b { own * (1.0 + damping) + floor } else { own }
+            if a == b { own * (1.0 + damping) + floor / units[free[a]].powi(2) } else { own }
         });
         // What is held at a bound moves there, and the others with it.
         let held: Vec<usize> = (0..x.len()).filter(|i| !free.contains(i)).collect();

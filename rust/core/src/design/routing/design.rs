@@ -29,7 +29,7 @@ pub(super) struct Answer {
     pub(super) best: Judged,
     /// Least sum of squared distances with any azimuth that was met.
     pub(super) relaxed: f64,
-    /// Every routing was tried.
+    /// Every routing was looked at over a row of tensions.
     pub(super) whole: bool,
     /// The nearest routings of the search, in holes.
     pub(super) found: Vec<Candidate>,

@@ -47,7 +47,7 @@ const FARTHEST: f64 = 1e6;
 pub enum Optimality {
     /// Every disk is in its place: nothing is nearer.
     Reached,
-    /// Every routing was tried.
+    /// Every routing was looked at over a row of tensions.
     Exhaustive,
     /// The best that a search met.
     Searched,

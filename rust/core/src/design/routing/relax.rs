@@ -37,6 +37,22 @@ impl Freedom {
     pub(super) fn whole(task: &Task<'_>) -> Self {
         Self { azimuths: true, radii: task.settings.radius, pulls: Pulls::Tensions }
     }
+
+    /// What so many unknowns are measured in, in their order: radians, lengths of the robot, the tension that is one
+    /// bending stiffness over length².
+    pub(super) fn units(&self, task: &Task<'_>, count: usize) -> Vec<f64> {
+        let mut units = Vec::with_capacity(count);
+        for azimuths in task.radii.iter().map(Vec::len) {
+            units.resize(units.len() + azimuths * usize::from(self.azimuths), 1.0);
+            units.resize(units.len() + azimuths * usize::from(self.radii.is_some()), task.length());
+        }
+        let pull = match self.pulls {
+            Pulls::Tensions => task.plan.unit / task.plan.slenderness,
+            Pulls::Displacements => task.length(),
+        };
+        units.resize(count, pull);
+        units
+    }
 }
 
 /// A routed robot and its shape.

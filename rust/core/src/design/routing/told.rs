@@ -87,7 +87,9 @@ fn message(task: &Task<'_>, out: &Routed) -> String {
         let left = format!("any azimuth would leave {:.3e} m", out.relaxed_rms);
         let known = match (task.settings.holes, out.optimality) {
             (None, _) => "the nearest that descents led to".to_owned(),
-            (_, Optimality::Exhaustive) => format!("every routing was tried; {left}"),
+            (_, Optimality::Exhaustive) => {
+                format!("every routing was looked at over a row of tensions; {left}")
+            }
             _ => format!("the nearest that the search met; {left}"),
         };
         format!(
