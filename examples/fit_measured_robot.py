@@ -108,6 +108,8 @@ def main() -> None:
     figure = Figure(figsize=(5.2, 3.6), layout="constrained")
     last.plot(figure.add_subplot())
     figure.savefig(folder / "fit_measured_robot.png", dpi=160)
+    axes = last.plot_residuals()
+    axes[0].figure.savefig(folder / "fit_measured_robot_residuals.png", dpi=160)
     print(f"figure written to {folder}")
 
 

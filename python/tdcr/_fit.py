@@ -138,6 +138,63 @@ class Fit(Value):
         ax.legend(frameon=False)
         return ax
 
+    def plot_residuals(self, axes: Any = None) -> Any:
+        """Draw measured minus predicted positions along x, y and z over the rows.
+
+        Outliers beyond twice what 99 % keep within are drawn at the edge and counted.
+
+        Parameters
+        ----------
+        axes : sequence of three matplotlib Axes, optional
+            One above the other.
+
+        Returns
+        -------
+        sequence of three matplotlib Axes
+        """
+        if axes is None:
+            from matplotlib.figure import Figure
+
+            axes = Figure(figsize=(7.0, 5.5), layout="constrained").subplots(3, sharex=True)
+        points = self.residuals.shape[1]
+        rows, held = np.repeat(self.rows, points), np.repeat(self.validation, points)
+        looks = [
+            (self.residuals_before, np.ones_like(held), "before", "#9AA5B1", "none"),
+            (self.residuals, ~held, "after, fitted to", "#2A6F97", "none"),
+            (self.residuals, held, "after, held out", "#C8553D", "#C8553D"),
+        ]
+        both = np.abs(np.concatenate([self.residuals_before, self.residuals])) * 1e3
+        limit = 2 * float(np.percentile(both, 99)) or 1.0
+        for c, axis in enumerate("xyz"):
+            ax = axes[c]
+            beyond = 0
+            for values, which, label, edge, face in looks:
+                if which.any():
+                    own = values[..., c].ravel()[which] * 1e3
+                    beyond += int((np.abs(own) > limit).sum())
+                    own = np.clip(own, -limit, limit)
+                    ax.scatter(
+                        rows[which],
+                        own,
+                        s=9,
+                        facecolors=face,
+                        edgecolors=edge,
+                        linewidths=0.7,
+                        label=label,
+                    )
+            ax.axhline(0, color="0.3", linewidth=0.8, zorder=0)
+            if beyond:
+                ax.text(0.99, 0.06, f"{beyond} beyond", transform=ax.transAxes, ha="right")
+            ax.set_ylabel(f"{axis} [mm]")
+            ax.grid(True, linewidth=0.4)
+        axes[0].set_title("measured minus predicted", fontsize=10)
+        axes[2].set_xlabel("row of the measurements")
+        ax = axes[0]
+        ax.legend(frameon=False, ncols=3, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1))
+        ax.title.set_horizontalalignment("left")
+        ax.title.set_x(0)
+        return axes
+
     def __repr__(self) -> str:
         """Tell what was fitted and how well."""
         part: Part = "validation" if self.validation.any() else "train"

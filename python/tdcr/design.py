@@ -67,8 +67,8 @@ class Prebend(Value):
     the nearest robot that was found, or obstacles stand in the way; others: the rod does not follow
     the displacements."""
     message: str
-    """What stood in the way; when it converged, empty but for obstacles that the designed robot
-    rests in and what the solve among them says of the way."""
+    """What stood in the way; when it converged, empty but for disks that `smoothness` keeps from
+    their places, obstacles that the designed robot rests in and what the solve among them says."""
     target_positions: Array
     """Wanted places of disks 1 to n, (n, 3), world frame [m]."""
     settings: PrebendSettings

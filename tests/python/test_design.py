@@ -111,6 +111,9 @@ def test_bounds_smoothness_and_other_rods_are_met_by_descent():
     assert "at max_bend" in held.message
     smooth = design.prebend(finger(), places, pulls, settings=tdcr.PrebendSettings(smoothness=0.1))
     assert smooth.ok
+    disk = int(smooth.error.argmax())
+    assert smooth.message.startswith(f"disk {disk} stays ")
+    assert "from its place, with smoothness" in smooth.message
     roughness = [np.diff(a.robot.backbone.rest, axis=0).std() for a in (free, smooth)]
     assert roughness[1] < roughness[0]
     rod = tdcr.RodSettings(tendons="proportional")

@@ -246,6 +246,12 @@ def test_results_are_values_and_are_drawn():
     pytest.importorskip("matplotlib")
     axis = answer.plot()
     assert len(axis.lines) == 2
+    axes = answer.plot_residuals()
+    before, fitted, held = axes[1].collections
+    np.testing.assert_array_equal(before.get_offsets()[:, 0], np.repeat(answer.rows, 9))
+    sideways = answer.residuals[..., 1] * 1e3
+    np.testing.assert_array_equal(held.get_offsets()[:, 1], sideways[answer.validation].ravel())
+    np.testing.assert_array_equal(fitted.get_offsets()[:, 1], sideways[~answer.validation].ravel())
     stopped = design.fit(trunk(), measured, ["azimuth"], displacements=given, max_iterations=1)
     assert stopped.status == "iteration_limit"
     with pytest.raises(tdcr.NotConverged, match="1 iterations"):

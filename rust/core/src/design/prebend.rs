@@ -274,8 +274,12 @@ impl Design<'_> {
         let (status, message) = if done.shape.report.status != Status::Converged {
             let text = format!("the rod does not follow the displacements: {}", done.shape.message);
             (done.shape.report.status, text)
-        } else if self.reached(&done) || self.settings.smoothness > 0.0 {
+        } else if self.reached(&done) {
             (Status::Converged, String::new())
+        } else if self.settings.smoothness > 0.0 {
+            let disk = errors.iter().position(|e| *e == worst).unwrap_or(0);
+            let what = "with smoothness: the least sum of both";
+            (Status::Converged, format!("disk {disk} stays {worst:.3e} m from its place, {what}"))
         } else if self.stopped() {
             (Status::IterationLimit, "stopped before the end".to_owned())
         } else {
