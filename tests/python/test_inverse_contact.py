@@ -113,3 +113,14 @@ def test_what_a_function_raises_comes_out(call):
     gradient = lambda point: (0.0, 0.0, 1.0)  # noqa: E731
     with pytest.raises(ZeroDivisionError, match="no distance here"):
         call(ROBOT, target, obstacles=tdcr.SignedDistance(broken, gradient))
+
+
+@pytest.mark.parametrize("call", [tdcr.inverse, tdcr.inverse_batch, tdcr.track])
+def test_a_function_that_fails_at_once_panics_nowhere(call, capfd):
+    def broken(point):
+        raise ZeroDivisionError("no distance anywhere")
+
+    target = [0.05, 0.0, 0.15] if call is tdcr.inverse else [[0.05, 0.0, 0.15]] * 3
+    with pytest.raises(ZeroDivisionError, match="no distance anywhere"):
+        call(ROBOT, target, obstacles=tdcr.SignedDistance(broken))
+    assert "panicked" not in capfd.readouterr().err

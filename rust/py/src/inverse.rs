@@ -251,9 +251,10 @@ pub(crate) fn _inverse(
         }
         Engine::Rod(inverse) => {
             let soon = around.any().is_none() && soon(inverse.settings(), ROD);
-            let found = invert_one(py, &**inverse, &target, start, &around, soon);
+            // First: an interrupt stops the functions of obstacles too.
+            let found = invert_one(py, &**inverse, &target, start, &around, soon)?;
             checked(py, Mutex::new(inverse.take_fault()))?;
-            found?
+            found
         }
     };
     let (displacements, tensions, answer, message) = found;
@@ -334,10 +335,10 @@ pub(crate) fn _inverse_places(
     let found = long_call::run(py, None, |control| {
         around.stopped_by(&control.stop);
         inverse.solve_places(&places, start.as_ref(), Some(&control.stop))
-    });
+    })?;
     checked(py, Mutex::new(inverse.take_fault()))?;
     let Placed { answer, displacements, tensions, message, state } =
-        found?.map_err(|e| invalid(&e))?;
+        found.map_err(|e| invalid(&e))?;
     let known = state.map(|state| (displacements.clone(), state));
     let shape = shape_of(py, robot, &plans, known, Choice::new(model, settings)?, around)?;
     Ok((row(py, displacements, tensions, &answer, message)?, shape))
@@ -447,9 +448,9 @@ pub(crate) fn _inverse_batch<'py>(
             invert_many(py, &**inverse, &targets, start, pool, progress, &around)
         }
         Engine::Rod(inverse) => {
-            let rows = invert_many(py, &**inverse, &targets, start, pool, progress, &around);
+            let rows = invert_many(py, &**inverse, &targets, start, pool, progress, &around)?;
             checked(py, Mutex::new(inverse.take_fault()))?;
-            rows
+            Ok(rows)
         }
     }
 }

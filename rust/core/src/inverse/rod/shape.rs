@@ -114,15 +114,18 @@ impl RodInverse<'_> {
             Status::Converged => rise.map_or("", |rise| rise.message()).to_owned(),
             Status::Infeasible => "the bounds leave the robot no shape".to_owned(),
             status => {
-                let how =
-                    if status == Status::Unreachable { "the nearest" } else { "stopped at a" };
+                let how = if status == Status::Unreachable {
+                    "the nearest shape"
+                } else {
+                    "stopped: the shape"
+                };
                 let held = if held.is_empty() {
                     held.join("")
                 } else {
                     format!("; at its bound: {}", held.join(", "))
                 };
                 format!(
-                    "{how} shape of {} starts is {most:.2e} m off at disk {}, {mean:.2e} m root mean square{held}",
+                    "{how} of {} starts is {most:.2e} m off at disk {}, {mean:.2e} m root mean square{held}",
                     found.starts,
                     disk + 1
                 )

@@ -233,7 +233,11 @@ impl Balance for Leaning<'_> {
     fn displacement(&self, k: usize) -> f64 {
         // Under given tensions what tendons are over is counted from rest.
         let here = &self.work.descent.here;
-        here.over[k] + self.lack.1[k] - self.rod.plan().compliance[k] * here.tensions[k]
+        // Where an obstacle's function fails before the first balance there is none.
+        let (Some(over), Some(tension)) = (here.over.get(k), here.tensions.get(k)) else {
+            return 0.0;
+        };
+        over + self.lack.1[k] - self.rod.plan().compliance[k] * tension
     }
 
     fn displacement_slope(&self, k: usize, by: usize) -> f64 {
