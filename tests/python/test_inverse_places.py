@@ -60,6 +60,31 @@ def test_what_comes_nearest_is_a_minimum_like_that_of_scipy():
         assert square(answer, wanted) <= 2 * min(peer.cost for peer in peers) * (1 + 1e-9)
 
 
+@pytest.mark.parametrize(("tendons", "disks"), [(12, 2), (2, 2), (4, 4)])
+def test_long_subsegments_that_may_coil_are_not_left_so(tendons, disks):
+    draw = np.random.default_rng(0)
+    backbone = tdcr.Backbone(0.18, disks, youngs_modulus=200e9, diameter=0.001)
+    for _ in range(12):
+        ends = draw.integers(1, disks + 1, tendons).tolist()
+        azimuths = draw.uniform(0, 6.28, tendons).tolist()
+        robot = tdcr.Robot(
+            backbone, [tdcr.Tendon(a, 0.008, end=e) for a, e in zip(azimuths, ends, strict=True)]
+        )
+        pulls = draw.uniform(0, 1, tendons) * (draw.random(tendons) < 0.6)
+        shape = tdcr.forward(robot, tensions=pulls).require()
+        wanted = shape.positions + draw.normal(0, 1e-3, shape.positions.shape)
+        answer = tdcr.inverse(robot, positions=wanted)
+        assert answer.status is Status.unreachable
+        # What it was made of is as near as that at least.
+        own = ((shape.positions - wanted)[1:] ** 2).sum()
+        assert square(answer, wanted) <= own * (1 + 1e-9)
+        np.testing.assert_allclose(
+            np.linalg.norm((answer.shape.positions - wanted)[1:], axis=1).max(),
+            answer.error,
+            rtol=1e-6,
+        )
+
+
 def test_rows_of_nan_do_not_count():
     robot = trunk(0.3, 2)
     shape = shapes(robot, 1, seed=3)[0]

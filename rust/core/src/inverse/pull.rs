@@ -52,6 +52,8 @@ pub(super) struct Pull<'a, G = ToolGoal<'a>> {
 
 /// Second derivatives that are nearly right lead to a gradient of this precision in few steps.
 const PRECISION: f64 = 1e-6;
+/// Place of the balance nearest to what is wanted, among those that are kept.
+const NEAREST: usize = 2;
 
 impl<'a, G> Pull<'a, G> {
     pub(super) fn new(
@@ -154,6 +156,20 @@ impl<const R: usize, G: Goal<R>> Problem<R> for Pull<'_, G> {
                 hessian[a * size + b] += units[a] * units[b] * second[a * size + b];
             }
         }
+    }
+
+    fn restart(&mut self) {
+        self.rod.rest();
+        self.forget();
+    }
+
+    fn keep(&mut self) {
+        self.rod.keep(NEAREST);
+    }
+
+    fn go_back(&mut self) {
+        self.rod.go_back(NEAREST);
+        self.forget();
     }
 
     fn bounded(&self) -> bool {

@@ -98,6 +98,9 @@ impl<const R: usize> Search<'_, R> {
                 return (Status::IterationLimit, tried);
             }
             let k = effort.first + tried;
+            if tried > 0 {
+                problem.restart();
+            }
             let inside = if effort.method == Method::Newton {
                 start(k, &mut self.point);
                 self.fit.restore(&space.region, &mut self.point)
@@ -116,6 +119,9 @@ impl<const R: usize> Search<'_, R> {
             }
         }
         // A swarm looks where the starts did not.
+        if effort.fall_back {
+            problem.restart();
+        }
         if effort.fall_back
             && self.settle(problem, space, effort.swarm, 0)
             && let Some(status) = self.descend(problem, space, effort)
@@ -194,6 +200,7 @@ impl<const R: usize> Search<'_, R> {
     ) -> Status {
         let mut best: Option<(f64, Status, Vec<f64>)> = None;
         for (_, mut point) in std::mem::take(&mut self.candidates) {
+            problem.restart();
             let ending =
                 self.fit.descend(problem, &space.region, &mut point, Purpose::Nearest, POLISH);
             let squared = self.fit.residual.norm_squared();
@@ -205,10 +212,15 @@ impl<const R: usize> Search<'_, R> {
                 Ending::Stalled => Status::Unreachable,
                 _ => Status::IterationLimit,
             };
-            if best.as_ref().is_none_or(|(least, _, _)| squared < *least) {
+            let nearer = best.as_ref().is_none_or(|(least, _, _)| squared < *least);
+            if squared.is_finite() && nearer {
+                // After a step that was refused.
+                self.fit.evaluate(problem, &point);
+                problem.keep();
                 best = Some((squared, status, point));
             }
         }
+        problem.go_back();
         let Some((_, status, point)) = best else { return Status::NumericalError };
         self.point = point;
         status

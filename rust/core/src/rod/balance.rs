@@ -43,12 +43,12 @@ pub(crate) trait Balance: Debug {
     /// Its derivative by a tension.
     fn displacement_slope(&self, k: usize, by: usize) -> f64;
 
-    /// Keeps the balance at hand in one of two places for [`Self::go_back`], where tensions do not say which one it
-    /// is.
-    fn keep(&mut self, _place: usize) {}
+    /// Keeps the balance at hand in one of three places for [`Self::go_back`]: tensions do not always say which one
+    /// it is.
+    fn keep(&mut self, place: usize);
 
     /// Puts the balance that was kept in place of that at rest.
-    fn go_back(&mut self, _place: usize) {}
+    fn go_back(&mut self, place: usize);
 
     /// The shape at hand, where tensions do not say which one it is.
     fn state(&mut self) -> Option<State> {

@@ -51,6 +51,7 @@ pub(crate) struct Pulled<'r> {
     /// The last ones; steps start from the nearest.
     points: [Point; 3],
     at: usize,
+    kept: [Point; 3],
     sweep: Sweep,
     frames: Vec<Pose>,
     motion: Motion,
@@ -65,6 +66,7 @@ impl<'r> Pulled<'r> {
             rod,
             points: [Point::default(), Point::default(), Point::default()],
             at: 0,
+            kept: Default::default(),
             sweep: Sweep::default(),
             frames: Vec::new(),
             motion: Motion::new(),
@@ -266,6 +268,17 @@ impl Balance for Pulled<'_> {
         match self.plan().unknowns() {
             3 => self.differentiate_of::<3>(),
             _ => self.differentiate_of::<4>(),
+        }
+    }
+
+    fn keep(&mut self, place: usize) {
+        self.kept[place].clone_from(&self.points[self.at]);
+    }
+
+    fn go_back(&mut self, place: usize) {
+        self.rest();
+        if self.kept[place].sound {
+            self.points[0].clone_from(&self.kept[place]);
         }
     }
 

@@ -33,6 +33,15 @@ pub trait Problem<const R: usize> {
     /// the point evaluated last.
     fn add_hessian(&mut self, z: &[f64], weights: &SVector<f64, R>, hessian: &mut [f64]);
 
+    /// Forgets where it was, for problems whose values depend on that: what follows begins anew.
+    fn restart(&mut self) {}
+
+    /// Keeps where it is, for [`Self::go_back`].
+    fn keep(&mut self) {}
+
+    /// Back to where it was kept.
+    fn go_back(&mut self) {}
+
     /// Adds bounds on functions of the unknowns, as rows for a step from the point evaluated last; there are
     /// none unless this is defined.
     fn linearize(&self, _rows: &mut Rows) {}

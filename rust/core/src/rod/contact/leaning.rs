@@ -52,7 +52,7 @@ pub(crate) struct Leaning<'r> {
     /// The last ones; steps start from the nearest.
     points: [Point; POINTS],
     at: usize,
-    kept: [Point; 2],
+    kept: [Point; 3],
     /// Whether the descent's shape is that of the point at hand.
     held: bool,
     /// By what the balance at hand lacks: displacements of the disks, twists about the base's origin, and what lengths
