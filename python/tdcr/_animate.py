@@ -1,9 +1,10 @@
-"""Animated pictures of a pull. Imported on first use by the command line."""
+"""Animated pictures. Imported on first use by the command line and `Grasp.animate`."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -18,9 +19,10 @@ from tdcr._view import plane_of
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from matplotlib.animation import PillowWriter
     from numpy.typing import NDArray
 
-__all__ = ["animate_pull", "check_gif", "pulled_shapes"]
+__all__ = ["animate_pull", "check_gif", "gif_writer", "pulled_shapes"]
 
 _FPS, _HELD = 20, 12  # frames a second, and how many of them show the end
 _SIZE, _DPI = (6.0, 5.2), 90
@@ -54,6 +56,34 @@ def pulled_shapes(
     return shapes
 
 
+@contextmanager
+def gif_writer(
+    figure: Any, path: str | os.PathLike[str], fps: int, dpi: int
+) -> Iterator[PillowWriter]:
+    """Give the writer of a GIF that appears at the end, complete, or not at all.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        Whose frames the writer grabs.
+    path : str or os.PathLike
+        Replaced if it exists.
+    fps, dpi : int
+        Frames per second, dots per inch.
+    """
+    from matplotlib import rc_context
+    from matplotlib.animation import PillowWriter
+
+    writer = PillowWriter(fps=fps)
+    with TemporaryDirectory() as folder, rc_context({"savefig.bbox": None}):
+        whole = Path(folder) / "whole.gif"
+        # Not `writer.saving`: interrupted, it would write what there is, and fail over nothing.
+        writer.setup(figure, str(whole), dpi=dpi)
+        yield writer
+        writer.finish()
+        replace_file(path, lambda stream: stream.write(whole.read_bytes()))
+
+
 def animate_pull(
     shapes: list[Shape],
     path: str | os.PathLike[str],
@@ -79,19 +109,13 @@ def animate_pull(
         matplotlib is not installed.
     """
     check_gif(path)
-    from matplotlib import rc_context
-    from matplotlib.animation import PillowWriter
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     # No layout engine: it would shift the axes from frame to frame.
     figure = Figure(figsize=_SIZE)
     FigureCanvasAgg(figure)
-    writer = PillowWriter(fps=_FPS)
-    with TemporaryDirectory() as folder, rc_context({"savefig.bbox": None}):
-        whole = Path(folder) / "pull.gif"
-        # Not `writer.saving`: interrupted, it would write what there is, and fail over nothing.
-        writer.setup(figure, str(whole), dpi=_DPI)
+    with gif_writer(figure, path, _FPS, _DPI) as writer:
         for step in range(len(shapes)):
             figure.clear()
             _frame(figure, shapes, step)
@@ -100,8 +124,6 @@ def animate_pull(
                 progress(step + 1)
         for _ in range(_HELD):
             writer.grab_frame()
-        writer.finish()
-        replace_file(path, lambda stream: stream.write(whole.read_bytes()))
 
 
 def _frame(figure: Any, shapes: list[Shape], step: int) -> None:

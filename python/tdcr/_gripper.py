@@ -356,12 +356,12 @@ class Grasp(Value):
         return plot_grasp(self, step, ax, title)
 
     def animate(self, path: str | PathLike[str], *, fps: int = 10) -> None:
-        """Write the closing as a GIF.
+        """Write the closing as a GIF, which appears complete or not at all.
 
         Parameters
         ----------
         path : str or os.PathLike
-            Ending in .gif.
+            Ending in .gif; replaced if it exists.
         fps : int, optional
             Steps per second.
 
@@ -373,6 +373,8 @@ class Grasp(Value):
             A value of another type.
         ImportError
             matplotlib is not installed.
+        OSError
+            The file cannot be written.
         """
         from tdcr._plot_gripper import animate_grasp
 

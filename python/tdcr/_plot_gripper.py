@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tdcr._animate import gif_writer
 from tdcr._arguments import whole
 from tdcr._canvas import Scene, Solid, draw, draw_forces
 from tdcr._view import plane_of
@@ -68,12 +69,10 @@ def animate_grasp(grasp: Grasp, path: str | os.PathLike[str], fps: int) -> None:
     figure = _figure()
     # A constrained layout would shift the axes from frame to frame.
     figure.set_layout_engine("none")
-    from matplotlib.animation import PillowWriter
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure)
-    writer = PillowWriter(fps=fps)
-    with writer.saving(figure, os.fspath(path), dpi=80):
+    with gif_writer(figure, path, fps, dpi=80) as writer:
         for step in range(len(grasp.shares)):
             figure.clear()
             plot_grasp(grasp, step, figure.add_subplot(projection="3d"), None)

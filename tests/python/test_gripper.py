@@ -275,6 +275,33 @@ def test_pictures(grasp, tmp_path):
         assert picture.n_frames == 2
 
 
+@pytest.mark.parametrize("done", [0, 3])
+@pytest.mark.parametrize("there", [False, True])
+def test_a_closing_that_is_interrupted_is_not_written(done, there, grasp, tmp_path, monkeypatch):
+    """Before the first frame too, when there is nothing to write; an older file stays."""
+    pytest.importorskip("matplotlib")
+    from tdcr import _plot_gripper
+
+    path = tmp_path / "closing.gif"
+    if there:
+        path.write_bytes(b"older")
+    plot, drawn = _plot_gripper.plot_grasp, []
+
+    def interrupted(shown, step, *others):
+        if len(drawn) == done:
+            raise KeyboardInterrupt
+        drawn.append(step)
+        return plot(shown, step, *others)
+
+    monkeypatch.setattr(_plot_gripper, "plot_grasp", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        grasp.animate(path)
+    assert drawn == list(range(done))
+    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [
+        ("closing.gif", b"older")
+    ] * there
+
+
 @pytest.fixture(scope="module")
 def example():
     with example_script("mahapatra_ghosal_grippers") as module:
