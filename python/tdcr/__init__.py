@@ -60,6 +60,7 @@ from tdcr._inverse import (
 from tdcr._measurements import Measurements, read_measurements
 from tdcr._sensitivity import Gradient, Variation
 from tdcr._status import Status
+from tdcr._sweep import Sweep, sweep
 from tdcr._voxels import Volume, VoxelMap
 from tdcr._workspace import workspace
 from tdcr._workspace_results import Reach, Workspace
@@ -100,6 +101,7 @@ __all__ = [
     "SignedDistance",
     "Sphere",
     "Status",
+    "Sweep",
     "TdcrError",
     "Tendon",
     "Variation",
@@ -120,6 +122,7 @@ __all__ = [
     "pso",
     "read_measurements",
     "sensitivity",
+    "sweep",
     "track",
     "workspace",
 ]

@@ -22,7 +22,7 @@ from tdcr._core import __version__
 from tdcr._replace import replace_file
 from tdcr.errors import InvalidInput
 
-__all__ = ["FORMAT", "check_header", "header_text", "opened", "read_file", "write_file"]
+__all__ = ["FORMAT", "check_header", "header_text", "opened", "read_file", "taken", "write_file"]
 
 FORMAT = 1
 """Version of the format."""
@@ -43,7 +43,7 @@ def write_file(path: StrPath, kind: str, fields: dict[str, Any]) -> None:
         replace_file(path, lambda stream: stream.write(text.encode()))
         return
     arrays: dict[str, Any] = {}
-    header = header_text(kind, {name: _taken(v, name, arrays) for name, v in fields.items()})
+    header = header_text(kind, {name: taken(v, name, arrays) for name, v in fields.items()})
     replace_file(path, lambda stream: np.savez(stream, header=np.array(header), **arrays))
 
 
@@ -53,15 +53,15 @@ def header_text(kind: str, fields: dict[str, Any]) -> str:
     return json.dumps(_standard(data), ensure_ascii=False, allow_nan=False)
 
 
-def _taken(value: Any, name: str, arrays: dict[str, Any]) -> Any:
+def taken(value: Any, name: str, arrays: dict[str, Any]) -> Any:
     """Move the arrays of a value out of it; the few numbers of an obstacle, say, stay."""
     if isinstance(value, np.ndarray) and ("." not in name or value.size > 16):
         arrays[name] = value
         return {"array": name}
     if isinstance(value, dict):
-        return {key: _taken(one, f"{name}.{key}", arrays) for key, one in value.items()}
+        return {key: taken(one, f"{name}.{key}", arrays) for key, one in value.items()}
     if isinstance(value, list):
-        return [_taken(one, f"{name}.{i}", arrays) for i, one in enumerate(value)]
+        return [taken(one, f"{name}.{i}", arrays) for i, one in enumerate(value)]
     return value
 
 

@@ -9,6 +9,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from example_scripts import example_script
 
 import tdcr
 from tdcr._voxels import Grid, solid_angles, volume
@@ -369,3 +370,23 @@ def test_wrong_types_are_type_errors():
     ):
         with pytest.raises(TypeError, match="expected a"):
             call()
+
+
+def test_the_guides_picture_is_of_what_the_guide_says(tmp_path):
+    """Most directions are met in the middle, few at the rim; drawn by the example."""
+    pytest.importorskip("scipy")
+    pytest.importorskip("matplotlib")
+    with example_script("workspace_of_three_segments") as example:
+        found = example.sampled(2**15)
+        figure = example.draw(found)
+    axes, bar = figure.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [mm]", "z [mm]")
+    assert bar.get_ylabel() == "directions of the tip [sr]"
+    figure.savefig(tmp_path / "workspace.png")
+    assert (tmp_path / "workspace.png").stat().st_size > 10_000
+    seen = found.dexterity()
+    across = np.hypot(seen.centers[:, 0], seen.centers[:, 1])
+    high = (seen.centers[:, 2] > 0.1) & (seen.centers[:, 2] < 0.16)
+    middle, rim = high & (across < 0.06), high & (across > 0.11)
+    assert min(middle.sum(), rim.sum()) >= 10
+    assert seen.values[middle].mean() > 3 * seen.values[rim].mean()
