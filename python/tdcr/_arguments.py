@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Iterable
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from tdcr._core import Obstacle
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -16,7 +18,20 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["index", "number", "numbers", "vector", "whole"]
+__all__ = ["index", "number", "numbers", "several_obstacles", "vector", "whole"]
+
+
+def several_obstacles(obstacles: Any) -> tuple[Any, ...]:
+    """Give one obstacle or several as a tuple, which nobody can change.
+
+    What is among them and no obstacle the core refuses.
+    """
+    if isinstance(obstacles, Obstacle):
+        return (obstacles,)
+    if not isinstance(obstacles, Iterable):
+        got = type(obstacles).__name__
+        raise TypeError(f"obstacles: expected an obstacle or a sequence of obstacles, got {got}")
+    return tuple(obstacles)
 
 
 def whole(name: str, value: Any, least: int | None = None) -> int:

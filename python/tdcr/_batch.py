@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from tdcr import _core
+from tdcr._arguments import several_obstacles
 from tdcr._progress import told
 from tdcr._value import same
 
@@ -224,8 +225,6 @@ class ShapeBatch(Sequence["Shape"]):
         ------
         InvalidInput
             Another file: names path and field, what was expected and what was there.
-        ImportError
-            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
         OSError
             The file cannot be read.
         """
@@ -299,11 +298,8 @@ def forward_batch(
     """
     if isinstance(fields, str):
         fields = (fields,)
-    if isinstance(obstacles, _core.Obstacle):
-        obstacles = (obstacles,)
-    elif isinstance(obstacles, Iterable):
-        # Once: each row's shape is made of them again. What is no obstacle the core refuses.
-        obstacles = tuple(obstacles)
+    # Once: each row's shape is made of them again.
+    obstacles = several_obstacles(obstacles)
     total = len(displacements) if isinstance(displacements, Sized) else None
     with told(progress, "forward_batch", total) as tell:
         columns = _core._forward_batch(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tdcr import _core
-from tdcr._arguments import index, number, vector, whole
+from tdcr._arguments import index, number, several_obstacles, vector, whole
 from tdcr._force_closure import place_on_object, positively_span, wrenches
 from tdcr._placing import places_around, pulls
 from tdcr._progress import told
@@ -171,7 +171,7 @@ class Gripper:
         """
         steps = whole("steps", steps, 1)
         goals = pulls(displacements, self.fingers)
-        around = tuple(obstacles) if isinstance(obstacles, Iterable) else (obstacles,)
+        around = several_obstacles(obstacles)
         shares = np.linspace(0.0, 1.0, steps + 1)
         shares.flags.writeable = False
         starts: list[Shape | None] = [None] * len(self.fingers)

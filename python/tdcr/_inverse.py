@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from tdcr import _core
+from tdcr._arguments import several_obstacles
 from tdcr._core import Bounds, InverseSettings
 from tdcr._inverse_results import Inverse, InverseBatch
 from tdcr._progress import told
@@ -112,7 +113,7 @@ def inverse(
     """
     search = InverseSettings() if search is None else search
     bounds = _bounds(bounds)
-    around = _around(obstacles)
+    around = several_obstacles(obstacles)
     if (target is None) == (positions is None):
         got = "neither" if target is None else "both"
         raise InvalidInput(f"target: expected a target or positions, got {got}", "target")
@@ -233,7 +234,7 @@ def inverse_batch(
         "threads": threads,
         "chain": False,
         "method": method,
-        "obstacles": _around(obstacles),
+        "obstacles": several_obstacles(obstacles),
         "loads": loads,
     }
     return _many(robot, targets, model, bounds, settings, search, progress, options)
@@ -284,7 +285,7 @@ def track(
         "threads": None,
         "chain": True,
         "method": "newton",
-        "obstacles": _around(obstacles),
+        "obstacles": several_obstacles(obstacles),
         "loads": loads,
     }
     return _many(robot, targets, model, bounds, settings, search, progress, options)
@@ -346,13 +347,6 @@ def _bounds(bounds: BoundsLike | None) -> Bounds | None:
     except TypeError as error:
         message = str(error).removeprefix("displacement")
         raise TypeError(f"bounds{message}") from None
-
-
-def _around(obstacles: Any) -> Any:
-    """Turn obstacles into a tuple, which nobody can change; what is none is named by the core."""
-    if isinstance(obstacles, _core.Obstacle):
-        return (obstacles,)
-    return tuple(obstacles) if isinstance(obstacles, Iterable) else obstacles
 
 
 def _displacements(start: Any) -> Any:

@@ -278,8 +278,6 @@ class InverseBatch(Value, Sequence[Inverse]):
         ------
         InvalidInput
             Another file: names path and field, what was expected and what was there.
-        ImportError
-            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
         OSError
             The file cannot be read.
         """

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import numpy as np
 
-from tdcr import _core
-from tdcr._arguments import numbers, whole
+from tdcr._arguments import numbers, several_obstacles, whole
 from tdcr._batch import ShapeBatch, forward_batch
 from tdcr._progress import told
 from tdcr._replace import replace_file
@@ -135,9 +134,8 @@ def sweep(
 
     start, size = perf_counter(), whole("chunk", chunk, 1)
     writer = writer_of(path)
-    # Once: every chunk is solved among them. What is no obstacle the core refuses.
-    if isinstance(obstacles, Iterable) and not isinstance(obstacles, _core.Obstacle):
-        obstacles = tuple(obstacles)
+    # Once: every chunk is solved among them.
+    obstacles = several_obstacles(obstacles)
 
     def solve(rows: Array, tell: Callable[[int], object] | None = None) -> ShapeBatch:
         return forward_batch(

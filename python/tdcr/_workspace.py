@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from tdcr import _core
+from tdcr._arguments import several_obstacles
 from tdcr._chunks import Solver, spread
 from tdcr._progress import told
 from tdcr._workspace_results import Sampling, Workspace
@@ -113,7 +114,7 @@ def workspace(
     kind = _kind(sampling)
     limits = _limits(ranges, len(robot.tendons))
     count, size = _whole("samples", samples, 1), _whole("chunk", chunk, 1)
-    obstacles = (obstacles,) if isinstance(obstacles, _core.Obstacle) else tuple(obstacles)
+    obstacles = several_obstacles(obstacles)
     names = _names(fields)
     rows = _rows(limits, count, kind, _whole("seed", seed, 0))
     threads = 1 if executor is not None and threads is None else threads

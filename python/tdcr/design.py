@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from tdcr import _core
+from tdcr._arguments import several_obstacles
 from tdcr._core import Obstacle, PrebendSettings, Robot, RoutingSettings, clearance, forward
 from tdcr._fit import Fit, fit
 from tdcr._routing import Routing, routing, routing_batch
@@ -158,22 +159,11 @@ def prebend(
         if not isinstance(value, kind):
             got = type(value).__name__
             raise TypeError(f"{name}: expected {kind.__name__}, got {got}")
-    around = _sequence(obstacles)
+    around = several_obstacles(obstacles)
     places = wanted_places(robot, target_positions, settings.rod.subsegment)
     fields = _core._prebend(robot, places, displacements, settings)
     answer = Prebend(*fields, places, settings)
     return _among(answer, around) if around else answer
-
-
-def _sequence(obstacles: Obstacle | Iterable[Obstacle]) -> tuple[Obstacle, ...]:
-    """One obstacle or several as several."""
-    if isinstance(obstacles, Obstacle):
-        return (obstacles,)
-    if not isinstance(obstacles, Iterable):
-        got = type(obstacles).__name__
-        message = f"obstacles: expected an obstacle or a sequence of obstacles, got {got}"
-        raise TypeError(message)
-    return tuple(obstacles)
 
 
 def _among(free: Prebend, obstacles: tuple[Obstacle, ...]) -> Prebend:

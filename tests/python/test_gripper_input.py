@@ -122,7 +122,7 @@ def test_closing(gripper):
         with refused("progress", "a bool or a callable, got", TypeError):
             gripper.close([-0.001], BALL, steps=1, progress=progress)
     for obstacles in (3, None):
-        with refused("obstacles[0]", "an obstacle, got", TypeError):
+        with refused("obstacles", "an obstacle or a sequence of obstacles, got", TypeError):
             gripper.close([-0.001], obstacles, steps=1)
 
 

@@ -244,7 +244,7 @@ pub(crate) fn _inverse(
     let plans = Plans::new(robot, model, settings, &around)?;
     let engine = plans.engine(robot, bounds, search, method)?;
     let target = one_target(target)?;
-    let (found, state) = match &engine {
+    let found = match &engine {
         Engine::Arcs(inverse) => {
             let soon = soon(inverse.settings(), 1);
             invert_one(py, &**inverse, &target, start, &around, soon)?
@@ -257,27 +257,28 @@ pub(crate) fn _inverse(
             found
         }
     };
-    let (displacements, tensions, answer, message) = found;
-    let known = state.map(|state| (displacements.clone(), state));
-    let shape = shape_of(py, robot, &plans, known, Choice::new(model, settings)?, around)?;
-    Ok((row(py, displacements, tensions, &answer, message)?, shape))
+    with_shape(py, robot, &plans, found, Choice::new(model, settings)?, around)
 }
 
-/// The shape found, where displacements do not say which it is: solved again from there.
-fn shape_of(
+/// A row, and the shape found where displacements do not say which it is: solved again from there.
+fn with_shape(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
     plans: &Plans<'_>,
-    known: Option<(Vec<f64>, State)>,
+    ((displacements, tensions, answer, message), state): Found,
     choice: Choice,
     around: Surroundings,
-) -> PyResult<Option<Shape>> {
-    let (Some((displacements, state)), Plans::Rod(plan, Some(scene))) = (known, plans) else {
-        return Ok(None);
+) -> PyResult<(Row, Option<Shape>)> {
+    let shape = match (state, plans) {
+        (Some(state), Plans::Rod(plan, Some(scene))) => {
+            let load = Load::Displacements(displacements.clone());
+            let solve = |rod: &Watched<'_>| rod.solve_load(load, Some(state));
+            let (given, shape) = surroundings::solve(py, &robot.get().0, plan, scene, solve)?;
+            Some(Shape::new(robot.get().clone(), choice, given, shape).among(around))
+        }
+        _ => None,
     };
-    let solve = |rod: &Watched<'_>| rod.solve_load(Load::Displacements(displacements), Some(state));
-    let (given, shape) = surroundings::solve(py, &robot.get().0, plan, scene, solve)?;
-    Ok(Some(Shape::new(robot.get().clone(), choice, given, shape).among(around)))
+    Ok((row(py, displacements, tensions, &answer, message)?, shape))
 }
 
 /// Wanted places of disks, from the first: rows of all disks or of those beyond the base, NaN where none is wanted.
@@ -339,9 +340,8 @@ pub(crate) fn _inverse_places(
     checked(py, Mutex::new(inverse.take_fault()))?;
     let Placed { answer, displacements, tensions, message, state } =
         found.map_err(|e| invalid(&e))?;
-    let known = state.map(|state| (displacements.clone(), state));
-    let shape = shape_of(py, robot, &plans, known, Choice::new(model, settings)?, around)?;
-    Ok((row(py, displacements, tensions, &answer, message)?, shape))
+    let found = ((displacements, tensions, answer, message), state);
+    with_shape(py, robot, &plans, found, Choice::new(model, settings)?, around)
 }
 
 /// Displacements, tensions, how it ended and the message, and the shape where displacements do not say which it is.

@@ -99,6 +99,13 @@ impl<'a, G> Pull<'a, G> {
         self.sound
     }
 
+    /// Displacements at hand \[m\]; rounding leaves none outside its bounds.
+    pub(super) fn write_displacements(&self, place: &mut [f64]) {
+        for (k, (displacement, (lower, upper))) in place.iter_mut().zip(self.ranges).enumerate() {
+            *displacement = self.rod.displacement(k).max(*lower).min(*upper);
+        }
+    }
+
     /// Forgets the point evaluated last: the rod is put elsewhere.
     pub(super) fn forget(&mut self) {
         self.sound = false;

@@ -121,12 +121,11 @@ impl<const R: usize> Search<'_, R> {
         // A swarm looks where the starts did not.
         if effort.fall_back {
             problem.restart();
-        }
-        if effort.fall_back
-            && self.settle(problem, space, effort.swarm, 0)
-            && let Some(status) = self.descend(problem, space, effort)
-        {
-            return (status, effort.starts);
+            if self.settle(problem, space, effort.swarm, 0)
+                && let Some(status) = self.descend(problem, space, effort)
+            {
+                return (status, effort.starts);
+            }
         }
         if !effort.nearest {
             return (Status::Unreachable, effort.starts);
@@ -220,8 +219,9 @@ impl<const R: usize> Search<'_, R> {
                 best = Some((squared, status, point));
             }
         }
-        problem.go_back();
         let Some((_, status, point)) = best else { return Status::NumericalError };
+        // Only to what this search kept: another one's balance would depend on the rows before.
+        problem.go_back();
         self.point = point;
         status
     }

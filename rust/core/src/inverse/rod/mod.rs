@@ -169,7 +169,7 @@ impl<'a> RodInverse<'a> {
     }
 
     fn rise(&self) -> Option<Rise<'_>> {
-        self.loaded.as_ref().map(|rod| Rise::new(rod, self.robot, &self.ranges))
+        self.loaded.as_ref().map(|rod| Rise::new(rod, self.robot))
     }
 
     /// Bounds that hold a point back.
@@ -187,12 +187,6 @@ impl<'a> RodInverse<'a> {
     fn write_tensions_of(&self, rod: &dyn Balance, place: &mut [f64]) {
         for (own, tension) in place.iter_mut().zip(rod.tensions()) {
             *own = tension * self.rest.unit();
-        }
-    }
-
-    fn write_displacements_of(&self, rod: &dyn Balance, place: &mut [f64]) {
-        for (k, (displacement, (lower, upper))) in place.iter_mut().zip(&self.ranges).enumerate() {
-            *displacement = rod.displacement(k).max(*lower).min(*upper);
         }
     }
 
@@ -360,7 +354,7 @@ impl Inverter for RodInverse<'_> {
     }
 
     fn write_displacements(&self, work: &RodWorkspace<'_>, place: &mut [f64]) {
-        self.write_displacements_of(work.pull.rod.as_ref(), place);
+        work.pull.write_displacements(place);
     }
 }
 

@@ -24,15 +24,14 @@ const FIRST: usize = 1;
 pub(super) struct Rise<'a> {
     rod: LoadedRod<'a>,
     robot: &'a Robot,
-    ranges: &'a [(f64, f64)],
     work: Workspace,
     /// Whether rest leads to the last answer.
     leads: bool,
 }
 
 impl<'a> Rise<'a> {
-    pub(super) fn new(rod: &LoadedRod<'a>, robot: &'a Robot, ranges: &'a [(f64, f64)]) -> Self {
-        Self { rod: rod.clone(), robot, ranges, work: Workspace::default(), leads: true }
+    pub(super) fn new(rod: &LoadedRod<'a>, robot: &'a Robot) -> Self {
+        Self { rod: rod.clone(), robot, work: Workspace::default(), leads: true }
     }
 
     /// Searches on until rest leads to an answer, or for a few more answers; the first is kept otherwise.
@@ -44,19 +43,16 @@ impl<'a> Rise<'a> {
         effort: Effort<'_>,
         mut start: impl FnMut(usize, &mut Vec<f64>),
     ) -> Found {
-        let mut first: Option<(Vec<f64>, Found)> = None;
-        let (mut iterations, mut starts) = (0, 0);
         let mut meet = Effort { freedom: Freedom::None, ..effort };
         self.leads = true;
-        for _ in 0..TRIES {
-            let found = search.run(pull, space, meet, &mut start);
-            (iterations, starts) = (iterations + found.iterations, starts + found.starts);
-            if found.status != Status::Converged {
-                if first.is_none() {
-                    return found;
-                }
-                break;
-            }
+        let first = search.run(pull, space, meet, &mut start);
+        if first.status != Status::Converged {
+            return first;
+        }
+        pull.rod.keep(FIRST);
+        let first_point = search.point.clone();
+        let (mut found, mut iterations, mut starts) = (first, first.iterations, first.starts);
+        for tried in 1..=TRIES {
             let point = search.point.clone();
             pull.rod.keep(MET);
             if effort.freedom != Freedom::None {
@@ -71,28 +67,27 @@ impl<'a> Rise<'a> {
             if self.comes_to(pull).unwrap_or(false) {
                 return Found { iterations, starts, ..found };
             }
-            if first.is_none() {
-                pull.rod.keep(FIRST);
-                first = Some((point, found));
-            }
-            if found.starts >= meet.starts || search.stopped() {
+            if tried == TRIES || found.starts >= meet.starts || search.stopped() {
                 break;
             }
             meet.first += found.starts;
             meet.starts -= found.starts;
             (meet.fall_back, meet.nearest) = (false, false);
+            found = search.run(pull, space, meet, &mut start);
+            (iterations, starts) = (iterations + found.iterations, starts + found.starts);
+            if found.status != Status::Converged {
+                break;
+            }
         }
-        let Some((point, found)) = first else { return search.run(pull, space, meet, start) };
         self.leads = false;
-        back(pull, search, FIRST, &point);
-        Found { iterations, starts, ..found }
+        back(pull, search, FIRST, &first_point);
+        Found { iterations, starts, ..first }
     }
 
     /// Whether the displacements at hand bring the tool to where it is.
     fn comes_to<G>(&mut self, pull: &Pull<'_, G>) -> Result<bool, InvalidInput> {
-        let own = self.ranges.iter().enumerate();
-        let displacements: Vec<f64> =
-            own.map(|(k, (low, high))| pull.rod.displacement(k).max(*low).min(*high)).collect();
+        let mut displacements = vec![0.0; self.robot.tendons().len()];
+        pull.write_displacements(&mut displacements);
         let report = self.rod.solve(&displacements, &mut self.work)?;
         let base = self.robot.base();
         let tip = self.rod.state(&self.work).frames.last().copied();

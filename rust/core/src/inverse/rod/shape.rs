@@ -138,7 +138,7 @@ impl RodInverse<'_> {
             message,
             state: pull.rod.state(),
         };
-        self.write_displacements_of(pull.rod.as_ref(), &mut placed.displacements);
+        pull.write_displacements(&mut placed.displacements);
         self.write_tensions_of(pull.rod.as_ref(), &mut placed.tensions);
         placed
     }

@@ -91,12 +91,6 @@ impl Kept {
 }
 
 impl LoadedRod<'_> {
-    /// Length of the shortest subsegment \[m\].
-    pub(super) fn shortest(&self) -> f64 {
-        let plan = self.plan();
-        (0..plan.data.len()).map(|i| plan.length(i)).fold(f64::INFINITY, f64::min)
-    }
-
     /// Puts the rest shape without multipliers, and compliances that are small against the rod's.
     pub(super) fn begin(&self, work: &mut Workspace) {
         let plan = self.plan();
@@ -134,14 +128,13 @@ impl LoadedRod<'_> {
         sides: bool,
         stop: Option<&'a AtomicBool>,
     ) -> Surroundings<'a> {
-        let shortest = self.shortest();
         Surroundings {
             plan: self.plan(),
             scene: self.scene(),
             share,
             drive: given.drive(),
-            reach: REACH * shortest,
-            slip: SLIP * shortest,
+            reach: REACH * self.shortest,
+            slip: SLIP * self.shortest,
             sides,
             stop,
         }

@@ -92,10 +92,9 @@ impl<'r> Leaning<'r> {
         work.fault = None;
         rod.begin(work);
         let mut budget = rod.plan().settings.max_iterations;
-        let given = Given::Tensions(tensions);
+        let given = Given::Tensions(tensions.clone());
         let sunk = rod.sink(work);
         let led = sunk.and_then(|()| rod.climb(&given, None, work, &mut budget, self.stop));
-        let Given::Tensions(tensions) = given else { return };
         self.rest = self.arrived(led, tensions);
     }
 

@@ -54,6 +54,8 @@ impl Workspace {
 pub struct LoadedRod<'r> {
     rod: Rod<'r>,
     scene: &'r Scene,
+    /// Length of the shortest subsegment \[m\].
+    pub(super) shortest: f64,
 }
 
 impl<'r> LoadedRod<'r> {
@@ -66,7 +68,9 @@ impl<'r> LoadedRod<'r> {
             let expected = "\"sliding\" among obstacles or under loads";
             return Err(InvalidInput::new("tendons", expected, "\"proportional\""));
         }
-        Ok(Self { rod: Rod::new(robot, plan), scene })
+        let lengths = (0..plan.data.len()).map(|i| plan.length(i));
+        let shortest = lengths.fold(f64::INFINITY, f64::min);
+        Ok(Self { rod: Rod::new(robot, plan), scene, shortest })
     }
 
     /// The same, whose solves end soon after the flag is set, with the status of an iteration limit.
@@ -130,7 +134,7 @@ impl<'r> LoadedRod<'r> {
     /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
     pub(super) fn recall(&self, start: &State, work: &mut Workspace) {
         let (plan, base) = (self.plan(), self.rod.robot.base());
-        let reach = REACH * self.shortest();
+        let reach = REACH * self.shortest;
         let mut near = Vec::new();
         for contact in start.contacts.iter().filter(|c| c.disk < self.scene.points.len()) {
             let same = |p: &Point| (p.kind, p.tendon) == (contact.kind, contact.tendon);
