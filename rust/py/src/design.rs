@@ -13,8 +13,9 @@ use tdcr::design::{self, angle_at_base, points_on_curve, prebend_stopped_by};
 use tdcr::rod::Subsegment;
 
 use crate::arguments::{number, whole};
+use crate::choice::Choice;
 use crate::convert::{called, frozen, frozen_points, invalid, status, vectors};
-use crate::forward::{Choice, one_row};
+use crate::forward::one_row;
 use crate::long_call;
 use crate::robot::Robot;
 use crate::rod::{RodSettings, named};

@@ -21,8 +21,8 @@ use tdcr::{InvalidInput, Status, constant_curvature, rod};
 
 use crate::arguments::{optional, whole};
 use crate::bounds::Bounds;
+use crate::choice::{Choice, rod_only};
 use crate::convert::{float_array, frozen, invalid, status, values, wrong_shape};
-use crate::forward::{Choice, rod_only};
 use crate::long_call;
 use crate::robot::Robot;
 use crate::rod::Load;

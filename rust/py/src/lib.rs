@@ -9,13 +9,16 @@
 
 mod arguments;
 mod backbone;
+mod batch;
 mod bounds;
+mod choice;
 mod constant_curvature;
 mod contact;
 mod convert;
 mod design;
 mod forward;
 mod inverse;
+mod jacobian;
 mod loads;
 mod long_call;
 mod mesh;
@@ -24,6 +27,7 @@ mod planar;
 mod planar_inverse;
 mod pso;
 mod pso_settings;
+mod rebuild;
 mod robot;
 mod rod;
 mod routing;
@@ -43,6 +47,8 @@ mod _core {
     #[pymodule_export]
     use crate::backbone::Backbone;
     #[pymodule_export]
+    use crate::batch::{_fields, _forward_batch};
+    #[pymodule_export]
     use crate::bounds::Bounds;
     #[pymodule_export]
     use crate::constant_curvature::{
@@ -53,9 +59,11 @@ mod _core {
     #[pymodule_export]
     use crate::design::{_points_on_curve, _prebend, PrebendSettings};
     #[pymodule_export]
-    use crate::forward::{_fields, _forward_batch, forward};
+    use crate::forward::forward;
     #[pymodule_export]
     use crate::inverse::{_inverse, _inverse_batch, _inverse_places, _inverse_solutions};
+    #[pymodule_export]
+    use crate::jacobian::jacobian;
     #[pymodule_export]
     use crate::loads::Loads;
     #[pymodule_export]
@@ -78,19 +86,21 @@ mod _core {
     #[pymodule_export]
     use crate::pso_settings::PsoSettings;
     #[pymodule_export]
+    use crate::rebuild::_shape;
+    #[pymodule_export]
     use crate::robot::Robot;
     #[pymodule_export]
     use crate::rod::{_chained_shape, RodSettings};
     #[pymodule_export]
     use crate::routing::{_routing, _routing_batch, RoutingSettings};
     #[pymodule_export]
-    use crate::sensitivity::{Sensitivity, jacobian, sensitivity};
+    use crate::sensitivity::{Sensitivity, sensitivity};
     #[pymodule_export]
     use crate::settings::{
         _rust_defaults, ConstantCurvatureSettings, InverseSettings, LinkageSettings,
     };
     #[pymodule_export]
-    use crate::shape::{_rotation_vector, _shape, Shape};
+    use crate::shape::{_rotation_vector, Shape};
     #[pymodule_export]
     use crate::signed_distance::SignedDistance;
     #[pymodule_export]

@@ -15,8 +15,8 @@ use tdcr::robot::Robot;
 use tdcr::rod::{self, Plan, Rod, Subsegment, TendonRule, Workspace};
 
 use crate::arguments::whole;
+use crate::choice::Choice;
 use crate::convert::{called, float_array, invalid, type_name, values, wrong_shape};
-use crate::forward::Choice;
 use crate::long_call;
 use crate::robot::Robot as PyRobot;
 use crate::shape::Shape;

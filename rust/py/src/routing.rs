@@ -11,8 +11,8 @@ use tdcr::design::{self, Routed, routing_rows, routing_stopped_by};
 
 use crate::arguments::{number, optional, whole};
 use crate::bounds::range;
+use crate::choice::Choice;
 use crate::convert::{called, frozen, invalid, status, type_name, vectors};
-use crate::forward::Choice;
 use crate::long_call;
 use crate::robot::Robot;
 use crate::rod::RodSettings;
