@@ -71,6 +71,7 @@ __all__ = [
     "_two_section_batch",
     "_two_section_nearest",
     "_two_section_solutions",
+    "cartesian_path",
     "clearance",
     "forward",
     "jacobian",
@@ -326,6 +327,7 @@ class SignedDistance(Obstacle):
     def gradient_function(self) -> Callable[[_Array], ArrayLike] | None: ...
     def __getnewargs_ex__(self) -> tuple[tuple[Any, ...], dict[str, Any]]: ...
 
+def cartesian_path(waypoints: ArrayLike, step: float, *, turn: float = 0.05) -> _Array: ...
 def clearance(obstacles: Obstacle | Iterable[Obstacle], points: ArrayLike) -> _Array: ...
 
 @final

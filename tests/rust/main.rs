@@ -8,6 +8,7 @@
 )]
 
 mod batch;
+mod cartesian;
 mod common;
 mod constant_curvature;
 mod constant_curvature_robot;

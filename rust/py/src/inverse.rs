@@ -68,19 +68,19 @@ fn one_target(value: &Bound<'_, PyAny>) -> PyResult<Target> {
 }
 
 /// Rows of targets.
-fn many_targets(value: &Bound<'_, PyAny>) -> PyResult<Vec<Target>> {
-    let array = float_array("targets", value)?;
+pub(crate) fn many_targets(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Target>> {
+    let array = float_array(argument, value)?;
     let width = match array.shape() {
         [_, 3] => 3,
         [_, 4, 4] => 16,
         shape => {
             let expected = "positions of shape (B, 3) or frames of shape (B, 4, 4)";
-            return Err(wrong_shape("targets", expected, shape));
+            return Err(wrong_shape(argument, expected, shape));
         }
     };
     let rows = values(&array)?.chunks_exact(width).enumerate();
     rows.map(|(row, numbers)| {
-        target("targets", numbers).map_err(|error| {
+        target(argument, numbers).map_err(|error| {
             invalid(&InvalidInput { got: format!("{} in row {row}", error.got), ..error })
         })
     })
@@ -435,7 +435,7 @@ pub(crate) fn _inverse_batch<'py>(
     let around = Surroundings::new(py, Some(obstacles), loads)?;
     let plans = Plans::new(robot, model, settings, &around)?;
     let engine = plans.engine(robot, bounds, search, method)?;
-    let targets = many_targets(targets)?;
+    let targets = many_targets("targets", targets)?;
     let pool = if chain {
         None
     } else {

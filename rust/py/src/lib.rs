@@ -11,6 +11,7 @@ mod arguments;
 mod backbone;
 mod batch;
 mod bounds;
+mod cartesian;
 mod choice;
 mod constant_curvature;
 mod contact;
@@ -50,6 +51,8 @@ mod _core {
     use crate::batch::{_fields, _forward_batch};
     #[pymodule_export]
     use crate::bounds::Bounds;
+    #[pymodule_export]
+    use crate::cartesian::cartesian_path;
     #[pymodule_export]
     use crate::constant_curvature::{
         _arc_frames, _arc_from_displacements, _arc_jacobian, _displacements_from_arc,

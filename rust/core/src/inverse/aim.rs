@@ -87,13 +87,9 @@ impl<'a> Aim<'a> {
             self.target = *to;
             return;
         }
-        let point = from.translation.lerp(&to.position(), share);
-        self.target = match to.rotation() {
-            None => Target::Position(point),
-            Some(rotation) => {
-                let turn = so3::log(&(from.rotation.tr_mul(rotation))) * share;
-                Target::Pose(Pose { rotation: from.rotation * so3::exp(&turn), translation: point })
-            }
+        self.target = match to {
+            Target::Position(point) => Target::Position(from.translation.lerp(point, share)),
+            Target::Pose(pose) => Target::Pose(from.toward(pose, share)),
         };
     }
 

@@ -7,6 +7,7 @@
 mod aim;
 mod answer;
 mod bounds;
+mod cartesian;
 mod chain;
 mod constant_curvature;
 mod places;
@@ -22,6 +23,7 @@ use nalgebra::{Matrix3, Vector3};
 
 pub use answer::Answer;
 pub use bounds::{Bounds, Range};
+pub use cartesian::cartesian_path;
 pub use constant_curvature::{ConstantCurvatureInverse, Solution, Workspace};
 pub use rod::{Placed, RodInverse, RodWorkspace};
 pub use rows::{InverseRows, Inverter, invert_path, invert_rows};

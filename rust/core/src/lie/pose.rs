@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
+use super::so3;
+
 /// A frame in another frame: `x_outer = rotation * x_inner + translation`.
 ///
 /// A rotation matrix, not a quaternion: chains of frames are composed and applied to points far
@@ -41,6 +43,17 @@ impl Pose {
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
         Self { rotation, translation: -(rotation * self.translation) }
+    }
+
+    /// A share of the way to another frame, both in one outer frame: the origin evenly along the straight
+    /// line, the axes evenly about one axis, as [`so3::log`] has it.
+    #[must_use]
+    pub fn toward(&self, other: &Self, share: f64) -> Self {
+        let turn = so3::log(&self.rotation.tr_mul(&other.rotation)) * share;
+        Self {
+            rotation: self.rotation * so3::exp(&turn),
+            translation: self.translation.lerp(&other.translation, share),
+        }
     }
 
     /// The homogeneous 4x4 matrix.
