@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tdcr._plot import check_picture, one_of, require_matplotlib
+from tdcr._plot import check_picture, one_of, require_matplotlib, save_figure
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def save_workspace(workspace: Workspace, path: str | os.PathLike[str], **options
 
     figure = Figure(figsize=_SIZE, layout="constrained")
     plot_workspace(workspace, ax=_axes(figure, options.get("view") == "3d"), **options)
-    figure.savefig(path, dpi=160, bbox_inches="tight")
+    save_figure(figure, path)
 
 
 def _axes(figure: Figure, solid: bool) -> Axes:

@@ -24,10 +24,14 @@ __all__ = [
     "facts_table",
     "print_demo",
     "print_shape",
+    "show",
     "table_of",
     "text_of",
     "vector_text",
 ]
+
+
+_WIDE = 10_000  # columns, more than any table has
 
 
 def as_json(result: Any) -> str:
@@ -71,9 +75,7 @@ def print_shape(shape: Shape, unit: str) -> None:
         row += [f"{length * scale:.{digits}f}" for length in lengths]
         row += [f"{shape.tensions[k]:.6g}"] if known else []
         tendons.add_row(text_of(name), *row)
-    console.print(facts)
-    console.print()
-    console.print(tendons)
+    show(console, facts, tendons)
 
 
 def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
@@ -109,7 +111,7 @@ def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
             f"{time * 1e6:.1f}",
         )
         table.add_section()
-    console.print(table)
+    show(console, table)
 
 
 def facts_table(console: Console, *facts: tuple[str, str]) -> Table:
@@ -152,6 +154,30 @@ def console_of() -> Console:
     return Console(highlight=False) if sys.stdout.isatty() else Console(
         highlight=False, width=400, no_color=True
     )  # fmt: skip
+
+
+def show(console: Console, *tables: Table) -> None:
+    """Print tables with an empty line between them, whole.
+
+    A terminal that is too narrow breaks their lines: a number that lost its last digits would look
+    like another one.
+    """
+    for index, table in enumerate(tables):
+        if index:
+            console.print()
+        if console.is_terminal:
+            wide = console.options.update(max_width=_WIDE)
+            fixed = all(column.no_wrap for column in table.columns)
+            width = console.measure(table, options=wide).maximum if fixed else 0
+            console.width = max(width, console.width)
+            console.print(table)
+            continue
+        with console.capture() as captured:
+            console.print(table)
+        # Without the blanks that fill columns up.
+        lines = captured.get().rstrip("\n").split("\n")
+        console.file.write("".join(f"{line.rstrip()}\n" for line in lines))
+    console.file.flush()
 
 
 def table_of(console: Console, *headers: str) -> Table:

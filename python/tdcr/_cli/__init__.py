@@ -1,14 +1,17 @@
 """The command ``tdcr``.
 
 Exit codes: 0 done, 1 a solve did not converge (its result is printed all the same), 2 input that
-cannot be used (one line on stderr), 130 interrupted.
+cannot be used (one line on stderr), 130 interrupted, 141 the reader of the output has gone.
 """
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from io import TextIOWrapper
 from typing import Any
 
 import click
@@ -37,10 +40,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         Exit code.
     """
+    _open_streams()
     try:
-        code = _group.main(arguments, prog_name="tdcr", standalone_mode=False)
+        code = _run(arguments)
         sys.stdout.flush()
-        return int(code or 0)
+    except (BrokenPipeError, _Unread):
+        # The reader has gone (| head): nothing is left to say, also not at exit. The code is what
+        # a shell gives programs that this signal ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
+    except OSError as error:
+        return _refuse(f"stdout: {error.strerror or error}")
+    return code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    """Run the command and say what went wrong."""
+    try:
+        return int(_group.main(arguments, prog_name="tdcr", standalone_mode=False) or 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         return 0
@@ -51,14 +68,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         click.echo("\n" * sys.stderr.isatty() + "tdcr: interrupted", err=True)
         return 130
     except BrokenPipeError:
-        # The reader has gone (| head): nothing is left to say, also not at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        raise
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
         return _refuse(f"{name}{error.strerror or error}")
     except (InvalidInput, ImportError) as error:
         return _refuse(str(error))
+
+
+def _open_streams() -> None:
+    """Give what is said a place where a stream was closed (``>&-``), and any name a spelling."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif isinstance(stream, TextIOWrapper):
+            # Where ASCII is all there is, a robot's name with an accent must not end the command.
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _refuse(message: str) -> int:
@@ -73,12 +99,28 @@ class _Interrupted(Exception):
     """Ctrl-C, under a name for which click writes no line of its own."""
 
 
+class _Unread(Exception):
+    """The reader of stdout has gone, under a name for which click does not exit with 1."""
+
+
 class _Commands(click.Group):
+    def make_context(self, *arguments: Any, **extra: Any) -> click.Context:
+        with _own_names():
+            return super().make_context(*arguments, **extra)
+
     def invoke(self, context: click.Context) -> Any:
-        try:
+        with _own_names():
             return super().invoke(context)
-        except KeyboardInterrupt:
-            raise _Interrupted from None
+
+
+@contextmanager
+def _own_names() -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise _Interrupted from None
+    except BrokenPipeError:
+        raise _Unread from None
 
 
 @click.group(
@@ -91,7 +133,8 @@ class _Commands(click.Group):
 def _group() -> None:
     """Tendon-driven continuum robots: shapes from tendon displacements, and back.
 
-    Exit codes: 0 done, 1 a solve did not converge, 2 input that cannot be used, 130 interrupted.
+    Exit codes: 0 done, 1 a solve did not converge, 2 input that cannot be used, 130 interrupted,
+    141 the reader of the output has gone.
     """
 
 

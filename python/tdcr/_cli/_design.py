@@ -48,11 +48,13 @@ def _done(found: Any, unit: str, json_file: str | None, files: tuple[str | None,
     from tdcr import _report_results as report
 
     output, plot_file = files
-    own.printed(
-        json_file, lambda: report.design_json(found), lambda: report.print_design(found, unit)
+    own.delivered(
+        lambda: report.design_json(found),
+        lambda: report.print_design(found, unit),
+        json_file,
+        (output, found.robot.save),
+        (plot_file, own.picture_of(found.shape, found.target_positions)),
     )
-    own.written(output, found.robot.save)
-    own.picture(found.shape, plot_file, found.target_positions)
     return own.said(found.ok, found.robot.name, found.status, found.message)
 
 

@@ -88,6 +88,7 @@ def fit(
     each row. Gains and offsets are not part of a robot: they are in the table and the JSON alone.
     """
     from tdcr import _report_results as report
+    from tdcr._plot import save_figure
     from tdcr.design import fit as solve
 
     own.checked_picture(plot_file)
@@ -118,12 +119,11 @@ def fit(
         seed=options["seed"],
     )
     shown = "m" if unit == "m" else "mm"
-    own.printed(
-        json_file,
-        lambda: report.fit_json(found),
+    own.delivered(
+        lambda: report.fit_json(found, measured),
         lambda: report.print_fit(found, measured, shown),
+        json_file,
+        (output, found.robot.save),
+        (plot_file, lambda path: save_figure(found.plot().figure, path)),
     )
-    own.written(output, found.robot.save)
-    if plot_file is not None:
-        found.plot().figure.savefig(plot_file, dpi=160, bbox_inches="tight")
     return own.said(found.ok, arm.name, found.status, found.message)

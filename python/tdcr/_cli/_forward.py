@@ -49,9 +49,13 @@ def forward(
     own.checked_picture(plot_file)
     pulls = own.in_metres(displacements, unit)
     shape = tdcr.forward(Robot.load(robot), pulls, model=model)
-    own.printed(json_file, lambda: _report.as_json(shape), lambda: _report.print_shape(shape, unit))
-    own.written(output, shape.save)
-    own.picture(shape, plot_file)
+    own.delivered(
+        lambda: _report.as_json(shape),
+        lambda: _report.print_shape(shape, unit),
+        json_file,
+        (output, shape.save),
+        (plot_file, own.picture_of(shape)),
+    )
     return own.said(shape.ok, shape.robot.name, shape.status, shape.message)
 
 
@@ -77,7 +81,7 @@ def demo(output: Path | None) -> int:
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
         for (name, _), shape in zip(DEMO, shapes, strict=True):
-            own.picture(shape, str(output / f"{name}.png"))
+            own.picture_of(shape)(str(output / f"{name}.png"))
             click.echo(f"picture: {output / name}.png")
     return max(own.said(s.ok, s.robot.name, s.status, s.message) for s in shapes)
 
@@ -89,7 +93,13 @@ def _timed(robot: Robot, displacements: Sequence[float]) -> float:
 
 
 @click.command("schema", epilog="Example: tdcr schema --output robot.schema.json")
-@click.option("-o", "--output", metavar="FILE", help="Write there instead of to stdout.")
+@click.option(
+    "-o",
+    "--output",
+    callback=own.writable,
+    metavar="FILE",
+    help="Write there instead of to stdout.",
+)
 def schema(output: str | None) -> None:
     """Print the JSON schema of robot files, for editors."""
     import json
@@ -98,6 +108,6 @@ def schema(output: str | None) -> None:
 
     text = json.dumps(robot_schema(), indent=2, ensure_ascii=False)
     if output is None:
-        click.echo(text)
+        click.echo(text.encode())
     else:
-        Path(output).write_text(text + "\n", encoding="utf-8")
+        own.write_text(output, text + "\n")

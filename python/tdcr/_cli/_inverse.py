@@ -70,13 +70,14 @@ def inverse(
     arm = Robot.load(robot)
     target = _pose(pose, unit) if pose is not None else _target(position, rotation, unit)
     answer = tdcr.inverse(arm, target, model=model, bounds=_bounds(bounds, unit))
-    own.printed(
-        json_file, lambda: report.as_json(answer), lambda: report.print_inverse(answer, unit)
+    marks = answer.target[None, :3, 3] if answer.target.ndim == 2 else answer.target[None]
+    own.delivered(
+        lambda: report.as_json(answer),
+        lambda: report.print_inverse(answer, unit),
+        json_file,
+        (output, answer.save),
+        (plot_file, lambda path: own.picture_of(answer.shape, marks)(path)),
     )
-    own.written(output, answer.save)
-    if plot_file is not None:
-        marks = answer.target[None, :3, 3] if answer.target.ndim == 2 else answer.target[None]
-        own.picture(answer.shape, plot_file, marks)
     return own.said(answer.ok, arm.name, answer.status, answer.message)
 
 
@@ -159,8 +160,11 @@ def track(
     found = tdcr.track(
         arm, targets, model=model, bounds=_bounds(bounds, unit), progress=own.progress()
     )
-    own.printed(json_file, lambda: report.as_json(found), lambda: report.print_track(found, unit))
-    own.written(output, found.save)
-    if plot_file is not None:
-        own.picture(found[-1].shape, plot_file, targets)
+    own.delivered(
+        lambda: report.as_json(found),
+        lambda: report.print_track(found, unit),
+        json_file,
+        (output, found.save),
+        (plot_file, lambda path: own.picture_of(found[-1].shape, targets)(path)),
+    )
     return own.rows_said(found)

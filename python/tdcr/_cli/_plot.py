@@ -77,9 +77,7 @@ def plot(
         got = f"{file} with a {type(thing).__name__}"
         raise click.UsageError(f"--pull and --animate: expected a robot file, got {got}")
     if isinstance(thing, Workspace):
-        from tdcr._plot_workspace import save_workspace
-
-        save_workspace(thing, str(output), view="3d" if view == "3d" else "section")
+        own.workspace_picture(thing, str(output), "3d" if view == "3d" else "section")
         return 0
     pulls = None if displacements is None else own.in_metres(displacements, unit)
     if animate is not None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from math import inf, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -17,28 +18,29 @@ from tdcr.errors import InvalidInput
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tdcr import Shape
+    from tdcr import Shape, Workspace
 
 __all__ = [
     "ROBOT",
     "checked_picture",
+    "delivered",
     "displacements_option",
     "in_metres",
     "json_option",
     "model_option",
     "numbers",
     "output_option",
-    "picture",
+    "picture_of",
     "picture_option",
     "points",
-    "printed",
     "progress",
     "rows_said",
     "said",
     "target_option",
     "unit_option",
+    "workspace_picture",
     "writable",
-    "written",
+    "write_text",
 ]
 
 _WORDS = {"inf": inf, "+inf": inf, "free": inf, "nan": nan}
@@ -202,28 +204,74 @@ def checked_picture(path: str | None) -> None:
         check_picture(path)
 
 
-def written(path: str | None, save: Callable[[str], object]) -> None:
-    """Save to a path, if there is one."""
-    if path is not None:
-        save(path)
+def delivered(
+    text: Callable[[], str],
+    table: Callable[[], None],
+    json_file: str | None,
+    *files: tuple[str | None, Callable[[str], object]],
+) -> None:
+    """Write a result to the files that are wanted, then print it: as JSON, or else as a table.
+
+    Files come first: a reader of the table that goes (``| head -1``) does not cost them. Where one
+    cannot be written the result is printed all the same.
+    """
+    try:
+        for path, save in files:
+            if path is not None:
+                save(path)
+        if json_file not in (None, "-"):
+            write_text(str(json_file), text() + "\n")
+    except Exception:
+        printed(text, table, json_file)
+        raise
+    printed(text, table, json_file)
 
 
-def printed(json_file: str | None, text: Callable[[], str], table: Callable[[], None]) -> None:
-    """Write JSON where it is wanted, and print the table unless JSON takes its place."""
+def printed(text: Callable[[], str], table: Callable[[], None], json_file: str | None) -> None:
+    """Print JSON where it takes the place of the table, or else the table."""
     if json_file == "-":
-        click.echo(text())
+        click.echo(text().encode())  # JSON is UTF-8 on any terminal
+    else:
+        table()
+
+
+def write_text(path: str, text: str) -> None:
+    """Write a text file, complete or not at all; a pipe or a device as it is."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        with named(path):
+            Path(path).write_text(text, encoding="utf-8")
         return
-    table()
-    if json_file is not None:
-        Path(json_file).write_text(text() + "\n", encoding="utf-8")
+    from tdcr._replace import replace_file
+
+    with named(path):
+        replace_file(path, lambda stream: stream.write(text.encode()))
 
 
-def picture(shape: Shape, path: str | None, marks: NDArray[Any] | None = None) -> None:
-    """Write the picture of a shape, with places marked."""
-    if path is not None:
+@contextmanager
+def named(path: str) -> Iterator[None]:
+    """Name the file over a fault of the system that does not (a full disk)."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, path) from None
+
+
+def picture_of(shape: Shape, marks: NDArray[Any] | None = None) -> Callable[[str], object]:
+    """Give what writes the picture of a shape, with places marked."""
+
+    def save(path: str) -> None:
         from tdcr._plot import save_picture
 
         save_picture(shape, path, marks=marks)
+
+    return save
+
+
+def workspace_picture(found: Workspace, path: str, view: str) -> None:
+    """Write the picture of a workspace."""
+    from tdcr._plot_workspace import save_workspace
+
+    save_workspace(found, path, view=view)
 
 
 def said(ok: bool, name: str | None, status: str, message: str) -> int:

@@ -97,14 +97,11 @@ def workspace(
         model=model,
         progress=own.progress(),
     )
-    own.printed(
-        json_file,
+    own.delivered(
         lambda: report.workspace_json(found),
         lambda: report.print_workspace(found, unit),
+        json_file,
+        (output, found.save),
+        (plot_file, lambda path: own.workspace_picture(found, path, view)),
     )
-    own.written(output, found.save)
-    if plot_file is not None:
-        from tdcr._plot_workspace import save_workspace
-
-        save_workspace(found, plot_file, view=view)
     return own.rows_said(found)
