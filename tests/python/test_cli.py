@@ -160,7 +160,11 @@ def test_real_processes_refuse_without_a_traceback(tmp_path):
     assert done.stdout == ""
     assert done.stderr == f"tdcr: error: {missing}: No such file or directory\n"
     done = process("nonsense")
-    assert (done.returncode, done.stderr) == (2, "tdcr: error: No such command 'nonsense'.\n")
+    assert (done.returncode, done.stderr) == (
+        2,
+        "tdcr: error: No such command 'nonsense'; expected demo, design, fit, forward, inverse, "
+        "plot, schema, track or workspace (see tdcr --help)\n",
+    )
 
 
 def test_the_demo_solves_the_bundled_robots(tmp_path):

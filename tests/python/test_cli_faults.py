@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from command_line import run, save_arm
 
@@ -47,7 +49,7 @@ BAD = [
     (["inverse", "--position", "1", "2", "3", "--pose", "p.txt"], "expected --position"),
     (["inverse", "--pose", "p.txt"], "p.txt: expected four rows of four numbers"),
     (["inverse", "--pose", "none.txt"], "none.txt: No such file"),
-    (["inverse", "--position", "1", "2"], "requires 3 arguments"),
+    (["inverse", "--position", "1", "2"], "'--position': expected 3 numbers, got 2"),
     (["inverse", "--position", "nan", "2", "3"], "target: expected a finite position [m], got NaN"),
     (["inverse", "--position", "1", "2", "3", "--model", "linkage"], "model: expected"),
     (["track", "none.csv"], "none.csv: No such file"),
@@ -112,3 +114,62 @@ def test_help_shows_an_example(command, capsys):
     out, _ = run(capsys, *command, "--help")
     assert "Example" in out
     assert f"tdcr {' '.join(command)} " in out
+
+
+@pytest.mark.parametrize(
+    "pulls",
+    [
+        ["-d", "-10 free free"],
+        ["-d", "-10,free,free"],
+        ["-d", "-10", "free", "free"],
+        ["-d", "-10,", "free,", "inf"],
+        ["--pull=-10", "free", "free"],
+        ["--displacements=-10,free,free"],
+    ],
+    ids=" ".join,
+)
+def test_numbers_are_typed_with_quotes_commas_or_neither(pulls, robot, capsys):
+    expected = run(capsys, "forward", robot, "-d", "-0.01 inf inf", "--json")
+    assert run(capsys, "forward", robot, *pulls, "--unit", "mm", "--json") == expected
+    assert run(capsys, "forward", *pulls, robot, "--unit", "mm", "--json") == expected
+
+
+def test_positions_and_bounds_are_typed_in_the_same_ways(robot, capsys):
+    rest = ["--unit", "mm", "--model", "constant_curvature", "--json"]
+
+    def out(*words):
+        return run(capsys, "inverse", *words, *rest, code=1)[0]
+
+    expected = out(robot, "--position", "-40", "10", "180", "--bounds", "-20", "20")
+    assert json.loads(expected)["target"] == [-0.04, 0.01, 0.18]
+    assert out(robot, "--position", "-40,10,180", "--bounds", "-20,20") == expected
+    assert out(robot, "--position", "-40 10 180", "--bounds", "-20 20") == expected
+    assert out("--position=-40,10,180", "--bounds=-20,20", robot) == expected
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        (["forwrd"], "No such command 'forwrd'; did you mean 'forward'? (see tdcr --help)"),
+        (["Plot"], "No such command 'Plot'; did you mean 'plot'? (see tdcr --help)"),
+        (
+            ["design", "bend"],
+            "No such command 'bend'; did you mean 'prebend'? (see tdcr design --help)",
+        ),
+        (["forward"], "Missing argument 'ROBOT'. (see tdcr forward --help)"),
+        (["inverse", "arm.toml"], "or --pose (see tdcr inverse --help)"),
+        (["plot", "arm.toml"], "or both (see tdcr plot --help)"),
+        (["forward", "arm.toml", "-d", "-10mm free free"], "'-10mm'; its unit is said by --unit"),
+        (
+            ["forward", "arm.toml", "-d", "x", "free"],
+            "finite numbers, inf or free, got 'x'",
+        ),
+        (["inverse", "arm.toml", "--position", "1", "2", "3", "4"], "expected 3 numbers, got 4"),
+        (["inverse", "arm.toml", "--position", "1m", "2", "3"], "numbers, got '1m'; its unit is"),
+        (["inverse", "arm.toml", "--position", "a,b,c"], "'--position': expected numbers, got 'a'"),
+        (["inverse", "arm.toml", "--bounds", "-5"], "'--bounds': expected 2 numbers, got 1"),
+    ],
+)
+def test_what_was_mistyped_is_told(command, text, robot, capsys):
+    _, err = run(capsys, *command, code=2)
+    assert text in err

@@ -9,14 +9,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from io import TextIOWrapper
-from typing import Any
 
 import click
 
 from tdcr import InvalidInput, __version__
+from tdcr._cli._click import Commands, Interrupted, Unread
 from tdcr._cli._design import design
 from tdcr._cli._fit import fit
 from tdcr._cli._forward import demo, forward, schema
@@ -44,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         code = _run(arguments)
         sys.stdout.flush()
-    except (BrokenPipeError, _Unread):
+    except (BrokenPipeError, Unread):
         # The reader has gone (| head): nothing is left to say, also not at exit. The code is what
         # a shell gives programs that this signal ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -61,9 +60,14 @@ def _run(arguments: Sequence[str] | None) -> int:
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         return 0
+    except click.BadParameter as error:
+        missing = isinstance(error, click.MissingParameter)
+        return _refuse(_said(error) + _see_help(error) * missing)
+    except click.UsageError as error:
+        return _refuse(_said(error) + _see_help(error))
     except click.ClickException as error:
-        return _refuse(" ".join(error.format_message().split()))
-    except (click.Abort, _Interrupted):
+        return _refuse(_said(error))
+    except (click.Abort, Interrupted):
         # On a terminal the line has a ^C already.
         click.echo("\n" * sys.stderr.isatty() + "tdcr: interrupted", err=True)
         return 130
@@ -87,6 +91,14 @@ def _open_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
+def _said(error: click.ClickException) -> str:
+    return " ".join(error.format_message().split())
+
+
+def _see_help(error: click.UsageError) -> str:
+    return f" (see {error.ctx.command_path} --help)" if error.ctx else ""
+
+
 def _refuse(message: str) -> int:
     """One line on stderr, however many faults there are."""
     first, *more = message.splitlines() or [""]
@@ -95,37 +107,9 @@ def _refuse(message: str) -> int:
     return 2
 
 
-class _Interrupted(Exception):
-    """Ctrl-C, under a name for which click writes no line of its own."""
-
-
-class _Unread(Exception):
-    """The reader of stdout has gone, under a name for which click does not exit with 1."""
-
-
-class _Commands(click.Group):
-    def make_context(self, *arguments: Any, **extra: Any) -> click.Context:
-        with _own_names():
-            return super().make_context(*arguments, **extra)
-
-    def invoke(self, context: click.Context) -> Any:
-        with _own_names():
-            return super().invoke(context)
-
-
-@contextmanager
-def _own_names() -> Iterator[None]:
-    try:
-        yield
-    except KeyboardInterrupt:
-        raise _Interrupted from None
-    except BrokenPipeError:
-        raise _Unread from None
-
-
 @click.group(
     "tdcr",
-    cls=_Commands,
+    cls=Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="Example: tdcr demo",
 )

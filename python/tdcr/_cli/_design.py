@@ -9,6 +9,7 @@ import click
 
 from tdcr import InvalidInput, Robot, RoutingSettings
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command, Commands
 
 __all__ = ["design"]
 
@@ -21,7 +22,9 @@ _CURVE = click.option(
 
 
 @click.group(
-    "design", epilog="Example: tdcr design prebend trunk.toml shape.csv --pull -5 --output new.toml"
+    "design",
+    cls=Commands,
+    epilog="Example: tdcr design prebend trunk.toml shape.csv --pull -5 --output new.toml",
 )
 def design() -> None:
     """Find the robot that takes a wanted shape."""
@@ -60,6 +63,7 @@ def _done(found: Any, unit: str, json_file: str | None, files: tuple[str | None,
 
 @design.command(
     "prebend",
+    cls=Command,
     epilog="\b\nExample:\n  tdcr design prebend finger.toml shape.csv --pull -5 --unit mm "
     "--output bent.toml",
 )
@@ -97,6 +101,7 @@ def prebend(
 
 @design.command(
     "routing",
+    cls=Command,
     epilog="\b\nExample:\n  tdcr design routing trunk.toml shape.csv --holes 12 --bounds -20 0 "
     "--unit mm --output routed.toml",
 )
@@ -109,13 +114,7 @@ def prebend(
     show_default=True,
     help="Holes per disk, evenly spaced; 0 allows any azimuth.",
 )
-@click.option(
-    "--bounds",
-    nargs=2,
-    type=float,
-    metavar="LOW HIGH",
-    help="Least and greatest displacement of every tendon.",
-)
+@own.BOUNDS
 @_CURVE
 @own.target_option
 @own.json_option
@@ -125,7 +124,7 @@ def routing(
     robot: Path,
     target: Path,
     holes: int,
-    bounds: tuple[float, float] | None,
+    bounds: list[float] | None,
     curve: bool,
     unit: str | None,
     json_file: str | None,

@@ -63,7 +63,7 @@ def _names(
     "--free-from",
     type=float,
     metavar="LENGTH",
-    help="Tendons released by this much or more are slack.",
+    help="Tendons released by this much or more, in --unit, are slack.",
 )
 @own.model_option("rod", "constant_curvature")
 @click.option(

@@ -13,6 +13,7 @@ import click
 import tdcr
 from tdcr import Robot
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command
 
 __all__ = ["demo", "forward", "schema"]
 
@@ -25,6 +26,7 @@ DEMO = (
 
 @click.command(
     "forward",
+    cls=Command,
     epilog='\b\nExample:\n  tdcr forward trunk.toml -d "-70 free free free" --unit mm',
 )
 @own.ROBOT

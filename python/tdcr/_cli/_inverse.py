@@ -10,30 +10,30 @@ import click
 import tdcr
 from tdcr import InvalidInput, Robot
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command, Numbers
 
 __all__ = ["inverse", "track"]
-
-_BOUNDS = click.option(
-    "--bounds",
-    nargs=2,
-    type=float,
-    metavar="LOW HIGH",
-    help="Least and greatest displacement of every tendon.",
-)
 
 
 @click.command(
     "inverse",
+    cls=Command,
     epilog="\b\nExamples:\n  tdcr inverse trunk.toml --position 60 20 150 --unit mm\n"
     "  tdcr inverse trunk.toml --position 0.06 0.02 0.15 --rotation 0 40 0 "
     "--model constant_curvature",
 )
 @own.ROBOT
-@click.option("--position", nargs=3, type=float, metavar="X Y Z", help="Where the tool should be.")
+@click.option(
+    "--position",
+    cls=Numbers,
+    count=3,
+    metavar="X Y Z",
+    help="Where the tool should be, in --unit, in the world frame.",
+)
 @click.option(
     "--rotation",
-    nargs=3,
-    type=float,
+    cls=Numbers,
+    count=3,
     metavar="RX RY RZ",
     help="Rotation vector of the tool in degrees, with --position: how it should be turned.",
 )
@@ -44,18 +44,18 @@ _BOUNDS = click.option(
     help="Instead: the 4x4 frame of the tool by rows, numbers with commas or spaces between them.",
 )
 @own.model_option("rod", "constant_curvature")
-@_BOUNDS
+@own.BOUNDS
 @own.unit_option("the position, the bounds, the last column of a pose")
 @own.json_option
 @own.picture_option
 @own.output_option("the answer", ".npz", ".json")
 def inverse(
     robot: Path,
-    position: tuple[float, float, float] | None,
-    rotation: tuple[float, float, float] | None,
+    position: list[float] | None,
+    rotation: list[float] | None,
     pose: Path | None,
     model: str,
-    bounds: tuple[float, float] | None,
+    bounds: list[float] | None,
     unit: str,
     json_file: str | None,
     plot_file: str | None,
@@ -81,7 +81,7 @@ def inverse(
     return own.said(answer.ok, arm.name, answer.status, answer.message)
 
 
-def _bounds(bounds: tuple[float, float] | None, unit: str) -> Any:
+def _bounds(bounds: list[float] | None, unit: str) -> Any:
     return None if bounds is None else tuple(own.in_metres(bounds, unit))
 
 
@@ -127,12 +127,13 @@ def _pose(path: Path, unit: str) -> Any:
 
 @click.command(
     "track",
+    cls=Command,
     epilog="\b\nExample:\n  tdcr track trunk.toml circle.csv --unit mm --output pulls.csv",
 )
 @own.ROBOT
 @click.argument("path", type=click.Path(path_type=Path))
 @own.model_option("rod", "constant_curvature")
-@_BOUNDS
+@own.BOUNDS
 @own.target_option
 @own.json_option
 @own.picture_option
@@ -141,7 +142,7 @@ def track(
     robot: Path,
     path: Path,
     model: str,
-    bounds: tuple[float, float] | None,
+    bounds: list[float] | None,
     unit: str | None,
     json_file: str | None,
     plot_file: str | None,

@@ -12,12 +12,14 @@ import numpy as np
 import tdcr
 from tdcr import InvalidInput, Inverse, InverseBatch, Robot, Shape, ShapeBatch, Workspace
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command
 
 __all__ = ["plot"]
 
 
 @click.command(
     "plot",
+    cls=Command,
     epilog="\b\nExamples:\n  tdcr plot pulled.npz --output pulled.png\n"
     '  tdcr plot trunk.toml --pull "-20 free free" --unit mm --animate pull.gif',
 )

@@ -7,12 +7,13 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from math import inf, isfinite, nan
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from tdcr._cli._click import Numbers
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from tdcr import Shape, Workspace
 
 __all__ = [
+    "BOUNDS",
     "ROBOT",
     "checked_picture",
     "delivered",
@@ -28,7 +30,6 @@ __all__ = [
     "in_metres",
     "json_option",
     "model_option",
-    "numbers",
     "output_option",
     "picture_of",
     "picture_option",
@@ -43,29 +44,9 @@ __all__ = [
     "write_text",
 ]
 
-_WORDS = {"inf": inf, "+inf": inf, "free": inf, "nan": nan}
-
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 ROBOT: Callable[[Command], Command] = click.argument("robot", type=click.Path(path_type=Path))
-
-
-def numbers(
-    context: click.Context, parameter: click.Parameter, text: str | None
-) -> list[float] | None:
-    """Read numbers with commas or spaces between them."""
-    if text is None:
-        return None
-    found = []
-    for word in text.replace(",", " ").split():
-        try:
-            number = _WORDS[word.lower()] if word.lower() in _WORDS else float(word)
-        except ValueError:
-            number = -inf
-        if number in (inf, -inf) and word.lower() not in _WORDS:
-            raise click.BadParameter(f"expected finite numbers, inf or free, got {word!r}")
-        found.append(number)
-    return found
 
 
 def displacements_option(required: bool = True) -> Callable[[Command], Command]:
@@ -75,12 +56,22 @@ def displacements_option(required: bool = True) -> Callable[[Command], Command]:
         "--displacements",
         "--pull",
         "displacements",
-        callback=numbers,
+        cls=Numbers,
+        words=True,
         metavar="NUMBERS",
         required=required,
-        help="Change of length of each tendon, with commas or spaces between them: negative pulls, "
-        "0 holds, inf or free leaves the tendon idle.",
+        help="Change of length of each tendon in --unit, with commas or spaces between them: "
+        "negative pulls, 0 holds, inf or free leaves the tendon idle.",
     )
+
+
+BOUNDS: Callable[[Command], Command] = click.option(
+    "--bounds",
+    cls=Numbers,
+    count=2,
+    metavar="LOW HIGH",
+    help="Least and greatest displacement of every tendon in --unit.",
+)
 
 
 def model_option(*models: str) -> Callable[[Command], Command]:

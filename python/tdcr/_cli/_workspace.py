@@ -10,6 +10,7 @@ import click
 import tdcr
 from tdcr import Robot
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command, Numbers, read_numbers
 
 __all__ = ["workspace"]
 
@@ -21,8 +22,8 @@ def _ranges(
     found = []
     for word in text.replace(",", " ").split():
         ends = word.split(":")
-        read = own.numbers(context, parameter, " ".join(ends)) or []
-        if not (len(ends) == len(read) == 2 or len(ends) == len(read) == 1):
+        read = read_numbers(" ".join(ends), words=True)
+        if len(ends) != len(read) or len(ends) > 2:
             raise click.BadParameter(f"expected LOW:HIGH, a number or free, got {word!r}")
         found.append((read[0], read[-1]))
     if not found:
@@ -32,17 +33,19 @@ def _ranges(
 
 @click.command(
     "workspace",
+    cls=Command,
     epilog='\b\nExample:\n  tdcr workspace trunk.toml --ranges "-20:0 -20:0 free" --unit mm '
     "--samples 20000 --plot reach.png",
 )
 @own.ROBOT
 @click.option(
     "--ranges",
+    cls=Numbers,
     callback=_ranges,
     required=True,
     metavar="RANGES",
-    help="Of each tendon LOW:HIGH, a number that keeps it there, or free; with commas or spaces "
-    "between them. A single one is for all tendons.",
+    help="Of each tendon LOW:HIGH in --unit, a number that keeps it there, or free; with commas or "
+    "spaces between them. A single one is for all tendons.",
 )
 @click.option("--samples", type=int, default=10_000, show_default=True, help="Rows to solve.")
 @click.option(
