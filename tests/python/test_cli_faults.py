@@ -97,26 +97,6 @@ def test_files_that_cannot_be_written_are_refused_before_the_solve(
 
 
 @pytest.mark.parametrize(
-    "command",
-    [
-        ["inverse"],
-        ["track"],
-        ["workspace"],
-        ["design"],
-        ["design", "prebend"],
-        ["design", "routing"],
-        ["fit"],
-        ["plot"],
-    ],
-    ids=" ".join,
-)
-def test_help_shows_an_example(command, capsys):
-    out, _ = run(capsys, *command, "--help")
-    assert "Example" in out
-    assert f"tdcr {' '.join(command)} " in out
-
-
-@pytest.mark.parametrize(
     "pulls",
     [
         ["-d", "-10 free free"],

@@ -15,10 +15,12 @@ from io import TextIOWrapper
 import click
 
 from tdcr import InvalidInput, __version__
+from tdcr._cli import _shared as own
 from tdcr._cli._click import Commands, Interrupted, Unread
+from tdcr._cli._demo import demo
 from tdcr._cli._design import design
 from tdcr._cli._fit import fit
-from tdcr._cli._forward import demo, forward, schema
+from tdcr._cli._forward import forward, schema
 from tdcr._cli._inverse import inverse, track
 from tdcr._cli._plot import plot
 from tdcr._cli._workspace import workspace
@@ -111,7 +113,11 @@ def _refuse(message: str) -> int:
     "tdcr",
     cls=Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Example: tdcr demo",
+    epilog=own.examples(
+        "demo --files .",
+        "forward trunk.toml -d -15 free free free -5 free --unit mm",
+        files=False,
+    ),
 )
 @click.version_option(__version__, prog_name="tdcr", message="%(prog)s %(version)s")
 def _group() -> None:

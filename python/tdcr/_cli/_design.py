@@ -24,7 +24,9 @@ _CURVE = click.option(
 @click.group(
     "design",
     cls=Commands,
-    epilog="Example: tdcr design prebend trunk.toml shape.csv --pull -5 --output new.toml",
+    epilog=own.examples(
+        "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
+    ),
 )
 def design() -> None:
     """Find the robot that takes a wanted shape."""
@@ -64,8 +66,9 @@ def _done(found: Any, unit: str, json_file: str | None, files: tuple[str | None,
 @design.command(
     "prebend",
     cls=Command,
-    epilog="\b\nExample:\n  tdcr design prebend finger.toml shape.csv --pull -5 --unit mm "
-    "--output bent.toml",
+    epilog=own.examples(
+        "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
+    ),
 )
 @own.ROBOT
 @_TARGET
@@ -102,8 +105,9 @@ def prebend(
 @design.command(
     "routing",
     cls=Command,
-    epilog="\b\nExample:\n  tdcr design routing trunk.toml shape.csv --holes 12 --bounds -20 0 "
-    "--unit mm --output routed.toml",
+    epilog=own.examples(
+        "design routing finger.toml places.csv --holes 12 --bounds -10 0 --output routed.toml"
+    ),
 )
 @own.ROBOT
 @_TARGET

@@ -22,8 +22,10 @@ def _names(
 
 @click.command(
     "fit",
-    epilog="\b\nExample:\n  tdcr fit trunk.toml measured.csv --unit mm --pull-sign positive "
-    "--parameters gain,base --output fitted.toml",
+    epilog=own.examples(
+        "fit finger.toml bench.csv --unit mm --pull-sign positive --parameters gain "
+        "--output fitted.toml"
+    ),
 )
 @own.ROBOT
 @click.argument("measurements", type=click.Path(path_type=Path))

@@ -18,9 +18,10 @@ __all__ = ["inverse", "track"]
 @click.command(
     "inverse",
     cls=Command,
-    epilog="\b\nExamples:\n  tdcr inverse trunk.toml --position 60 20 150 --unit mm\n"
-    "  tdcr inverse trunk.toml --position 0.06 0.02 0.15 --rotation 0 40 0 "
-    "--model constant_curvature",
+    epilog=own.examples(
+        "inverse trunk.toml --position 60 20 170 --unit mm",
+        "inverse trunk.toml --position 0 0 0.2 --rotation 0 0 0 --model constant_curvature",
+    ),
 )
 @own.ROBOT
 @click.option(
@@ -128,7 +129,7 @@ def _pose(path: Path, unit: str) -> Any:
 @click.command(
     "track",
     cls=Command,
-    epilog="\b\nExample:\n  tdcr track trunk.toml circle.csv --unit mm --output pulls.csv",
+    epilog=own.examples("track trunk.toml path.csv --output pulls.csv"),
 )
 @own.ROBOT
 @click.argument("path", type=click.Path(path_type=Path))

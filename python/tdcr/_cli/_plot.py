@@ -20,8 +20,10 @@ __all__ = ["plot"]
 @click.command(
     "plot",
     cls=Command,
-    epilog="\b\nExamples:\n  tdcr plot pulled.npz --output pulled.png\n"
-    '  tdcr plot trunk.toml --pull "-20 free free" --unit mm --animate pull.gif',
+    epilog=own.examples(
+        "plot trunk.toml --pull -15 free free free -5 free --unit mm --output pulled.png",
+        "plot trunk.toml --pull -15 free free free -9 free --unit mm --animate pull.gif",
+    ),
 )
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(

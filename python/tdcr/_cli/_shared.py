@@ -27,6 +27,7 @@ __all__ = [
     "checked_picture",
     "delivered",
     "displacements_option",
+    "examples",
     "in_metres",
     "json_option",
     "model_option",
@@ -47,6 +48,13 @@ __all__ = [
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 ROBOT: Callable[[Command], Command] = click.argument("robot", type=click.Path(path_type=Path))
+
+
+def examples(*commands: str, files: bool = True) -> str:
+    """End of a help: commands that run as they stand, where the files of the examples are."""
+    head = "Example" + "s" * (len(commands) > 1)
+    note = ", in a folder with the files of `tdcr demo --files .`" * files
+    return "\b\n" + "\n".join([f"{head}{note}:", *(f"  tdcr {command}" for command in commands)])
 
 
 def displacements_option(required: bool = True) -> Callable[[Command], Command]:

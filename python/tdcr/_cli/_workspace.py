@@ -34,8 +34,10 @@ def _ranges(
 @click.command(
     "workspace",
     cls=Command,
-    epilog='\b\nExample:\n  tdcr workspace trunk.toml --ranges "-20:0 -20:0 free" --unit mm '
-    "--samples 20000 --plot reach.png",
+    epilog=own.examples(
+        "workspace trunk.toml --ranges -10:0 free free free -6:0 free --unit mm "
+        "--samples 2000 --sampling random --output cloud.npz"
+    ),
 )
 @own.ROBOT
 @click.option(
