@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -130,4 +131,31 @@ def test_a_picture_that_is_interrupted_is_not_written(
     before = set(tmp_path.iterdir())
     assert main(["plot", f"{kind}.npz", "--output", f"p.{ending}"]) == 130
     assert capsys.readouterr().err == "tdcr: interrupted\n"
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_an_interrupt_that_the_garbage_collector_swallows_ends_an_animation(
+    robot, tmp_path, capsys, monkeypatch
+):
+    pytest.importorskip("matplotlib")
+    from tdcr import _animate
+
+    class Dropped:
+        def __del__(self):
+            raise KeyboardInterrupt
+
+    drawn = []
+
+    def frame(figure, shapes, step):
+        drawn.append(step)
+        if step == 3:
+            Dropped()
+        time.sleep(0.005)
+
+    monkeypatch.setattr(_animate, "_frame", frame)
+    command = ["plot", robot, "--pull", "-0.01 free free", "--frames", "200"]
+    before = set(tmp_path.iterdir())
+    assert main([*command, "--animate", "p.gif"]) == 130
+    assert capsys.readouterr().err == "tdcr: interrupted\n"
+    assert 3 < len(drawn) < 100
     assert set(tmp_path.iterdir()) == before

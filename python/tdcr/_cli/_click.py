@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import sys
+from _thread import interrupt_main
 from collections.abc import Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from math import inf, isfinite, nan
+from threading import Timer
 from typing import Any
 
 import click
@@ -35,6 +38,32 @@ def _own_names() -> Iterator[None]:
         raise Unread from None
 
 
+@contextmanager
+def _interrupts_kept() -> Iterator[None]:
+    """Bring back a Ctrl-C that falls into a callback of the garbage collector.
+
+    Python prints what such a callback raises and goes on. matplotlib has one for every artist that
+    is dropped, so that one interrupt in sixty of an animation was lost.
+    """
+    before, timers = sys.unraisablehook, []
+
+    def hook(lost: Any) -> None:
+        if not issubclass(lost.exc_type, KeyboardInterrupt):
+            before(lost)
+            return
+        # Not from here, where it would be lost again.
+        timers.append(Timer(0.01, interrupt_main))
+        timers[-1].start()
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+        for timer in timers:
+            timer.cancel()
+
+
 class Commands(click.Group):
     """A group that says which command may have been meant."""
 
@@ -43,7 +72,7 @@ class Commands(click.Group):
             return super().make_context(*arguments, **extra)
 
     def invoke(self, context: click.Context) -> Any:
-        with _own_names():
+        with _own_names(), _interrupts_kept():
             return super().invoke(context)
 
     def resolve_command(
