@@ -34,13 +34,13 @@ __all__ = [
 _WIDE = 10_000  # columns, more than any table has
 
 
-def as_json(result: Any) -> str:
-    """Write a result as JSON text: what its `save` writes into a .json file."""
+def as_json(result: Any, **more: Any) -> str:
+    """Write a result as JSON text: what its `save` writes into a .json file, and more fields."""
     from tdcr._container import header_text
     from tdcr._save_kinds import KINDS
 
     kind = type(result).__name__
-    return header_text(kind, KINDS[kind].said(result))
+    return header_text(kind, KINDS[kind].said(result) | more)
 
 
 def print_shape(shape: Shape, unit: str) -> None:

@@ -22,14 +22,15 @@ if TYPE_CHECKING:
     from tdcr.design import Prebend
 
 __all__ = [
-    "as_json",
     "design_json",
     "fit_json",
+    "inverse_json",
     "print_design",
     "print_fit",
     "print_inverse",
     "print_track",
     "print_workspace",
+    "track_json",
     "workspace_json",
 ]
 
@@ -82,6 +83,26 @@ def _pulls(console: Any, robot: Robot, unit: str, displacements: Any, tensions: 
 
 def _told(value: float, least: float) -> float:
     return 0.0 if abs(value) <= least else value
+
+
+def inverse_json(answer: Inverse) -> str:
+    """Write an inverse as JSON that `Inverse.load` reads, with the shape for other readers."""
+    shape = answer.shape
+    return as_json(
+        answer,
+        ok=answer.ok,
+        units=shape.units,
+        tendon_names=list(shape.robot.tendon_names),
+        frames=shape.frames,
+        positions=shape.positions,
+        tip=shape.tip,
+    )
+
+
+def track_json(found: InverseBatch) -> str:
+    """Write a track as JSON that `InverseBatch.load` reads, with names for other readers."""
+    units = found[0].shape.units
+    return as_json(found, units=units, tendon_names=list(found.robot.tendon_names))
 
 
 def print_inverse(answer: Inverse, unit: str) -> None:
@@ -194,6 +215,10 @@ def print_workspace(found: Workspace, unit: str) -> None:
 def design_json(found: Any) -> str:
     """Write a design as JSON."""
     own = {
+        "ok": found.ok,
+        "units": found.shape.units,
+        "tendon_names": list(found.robot.tendon_names),
+        "frames": found.shape.frames,
         "status": found.status,
         "message": found.message,
         "iterations": found.iterations,
@@ -249,6 +274,7 @@ def _parts(found: Fit) -> list[str]:
 def fit_json(found: Fit, measured: Measurements) -> str:
     """Write a fit as JSON."""
     own: dict[str, Any] = {
+        "ok": found.ok,
         "status": found.status,
         "message": found.message,
         "iterations": found.iterations,

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import json
+import math
+import os
+import re
+from pathlib import Path
 
 import pytest
-from command_line import run, save_arm
+from command_line import PULL, arm, run, save_arm
 
 import tdcr
+from tdcr._cli import main
 
 
 @pytest.fixture
@@ -153,3 +160,129 @@ def test_positions_and_bounds_are_typed_in_the_same_ways(robot, capsys):
 def test_what_was_mistyped_is_told(command, text, robot, capsys):
     _, err = run(capsys, *command, code=2)
     assert text in err
+
+
+LOST = "; {} m is much for a robot of 0.2 m: add --unit mm if mm are meant\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        (["forward", "arm.toml", "-d", "-10", "free", "free"], LOST.format("10")),
+        (["plot", "arm.toml", "-o", "p.png", "--pull", "-10", "free", "free"], LOST.format("10")),
+        (["inverse", "arm.toml", "--position", "60", "0", "0"], LOST.format("59.8")),
+        (["track", "arm.toml", "path.csv", "--unit", "m"], LOST.format("59.8")),
+        (
+            ["workspace", "arm.toml", "--ranges", "-10:-9 free free", "--samples", "4"],
+            LOST.format("10"),
+        ),
+    ],
+    ids=lambda words: words[0],
+)
+def test_millimetres_that_were_taken_for_metres_are_told(command, text, robot, tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    (tmp_path / "path.csv").write_text("x,y,z\n60,0,0\n")
+    more = ["--sampling", "random"] if command[0] == "workspace" else []
+    _, err = run(capsys, *command, *more, code=1)
+    assert re.sub(r"(59\.8)\d*", r"\1", err).endswith(text)
+    in_mm = ["--unit", "mm"] if command[0] != "track" else []
+    main([*command[: command.index("--unit")]] if not in_mm else [*command, *more, *in_mm])
+    assert "is much for" not in capsys.readouterr().err
+
+
+def test_a_key_that_is_spelt_wrong_is_told_before_the_one_that_is_missing(robot, tmp_path, capsys):
+    text = (tmp_path / robot).read_text()
+    (tmp_path / "bad.toml").write_text(text.replace("azimuth", "azimut", 1))
+    _, err = run(capsys, "forward", "bad.toml", "-d", "0 0 0", code=2)
+    wrong = "tendons[0].azimut: unknown key; did you mean 'azimuth'? (and 1 more fault)"
+    assert err == f"tdcr: error: bad.toml: {wrong}\n"
+
+
+def test_no_pickle_is_advised_to_be_trusted(robot, tmp_path, capsys):
+    (tmp_path / "bad.npz").write_bytes(bytes(range(256)))
+    _, err = run(capsys, "plot", "bad.npz", "-o", "p.png", code=2)
+    assert err.startswith("tdcr: error: bad.npz: not an npz file")
+    assert "pickle" not in err
+
+
+def test_options_without_use_are_refused(robot, tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    tdcr.workspace(arm(), [(-0.01, 0.0)] + [(math.inf,) * 2] * 2, 8, sampling="grid").save("w.npz")
+    tdcr.forward(arm(), PULL).save("s.npz")
+    for arguments, text in (
+        (["w.npz", "--row", "0"], "--row: expected a batch or a track, got Workspace"),
+        (["s.npz", "--model", "rod"], "--model: expected a robot file, got a Shape"),
+        (["s.npz", "--frames", "3"], "--frames: expected --animate FILE too"),
+        ([robot, "--frames", "3"], "--frames: expected --animate FILE too"),
+        (["s.npz", "--unit", "mm"], "--unit: expected --pull too"),
+    ):
+        _, err = run(capsys, "plot", *arguments, "-o", "p.png", code=2)
+        assert text in err
+
+
+OUTPUTS = [
+    ["forward", "arm.toml", "-d", "0 0 0", "--json"],
+    ["forward", "arm.toml", "-d", "0 0 0", "--output"],
+    ["forward", "arm.toml", "-d", "0 0 0", "--plot"],
+    ["schema", "--output"],
+    ["plot", "arm.toml", "--output"],
+    ["plot", "arm.toml", "--pull", "0 0 0", "--animate"],
+    ["demo", "--files"],
+]
+
+
+@pytest.mark.parametrize("command", OUTPUTS, ids=" ".join)
+def test_what_is_kept_from_being_written_stays(command, robot, tmp_path, capsys, monkeypatch):
+    """A root user may write anything, so the question is answered for it."""
+    pytest.importorskip("matplotlib")
+    ending = {"--output": "json", "--animate": "gif"}.get(command[-1], "png")
+    name = "p.png" if command[0] == "plot" and ending == "json" else f"kept.{ending}"
+    name = "trunk.toml" if command[0] == "demo" else name
+    Path(name).write_text("kept")
+    allowed = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: str(path) != name and allowed(path, mode))
+    where = "." if command[0] == "demo" else name
+    _, err = run(capsys, *command, where, code=2)
+    said = "expected no such file, or" if command[0] == "demo" else "Permission denied"
+    assert err.startswith(f"tdcr: error: {name}: {said}")
+    assert Path(name).read_text() == "kept"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["forward", "FILE.toml", "-d", "0"],
+        ["inverse", "arm.toml", "--pose", "FILE.txt"],
+        ["track", "arm.toml", "FILE.csv"],
+        ["design", "prebend", "arm.toml", "FILE.csv", "-d", "0 0 0"],
+        ["fit", "arm.toml", "FILE.csv", "--unit", "mm", "--pull-sign", "positive",
+         "--parameters", "gain"],
+        ["plot", "FILE.json", "-o", "p.png"],
+        ["plot", "FILE.npz", "-o", "p.png"],
+    ],
+    ids=lambda command: command[0],
+)  # fmt: skip
+@pytest.mark.parametrize("kind", ["none", "folder", "unreadable", "empty", "binary"])
+def test_files_that_cannot_be_read_are_one_line(
+    kind, command, robot, tmp_path, capsys, monkeypatch
+):
+    pytest.importorskip("matplotlib")
+    name = next(word for word in command if word.startswith("FILE"))
+    path = tmp_path / name
+    if kind == "folder":
+        path.mkdir()
+    elif kind != "none":
+        path.write_bytes({"empty": b"", "binary": b"\x00\xff\xfe" * 50}.get(kind, b"x"))
+    if kind == "unreadable":
+        whole = io.open
+
+        def refuse(file, *arguments, **options):
+            if str(file) == name:
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), name)
+            return whole(file, *arguments, **options)
+
+        monkeypatch.setattr(io, "open", refuse)
+    _, err = run(capsys, *command, code=2)
+    assert err.startswith(f"tdcr: error: {name}: ")
+    said = {"none": "No such file", "folder": "Is a directory", "unreadable": "Permission denied"}
+    assert said.get(kind, "") in err

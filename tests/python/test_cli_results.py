@@ -11,6 +11,7 @@ import pytest
 from command_line import AZIMUTHS, PULL, arm, facts, picture, points, run, save_arm
 
 import tdcr
+from tdcr._cli import main
 
 
 @pytest.fixture
@@ -174,3 +175,54 @@ def test_a_workspace_of_which_nothing_converges(robot, capsys):
     out, err = run(capsys, *command, "--sampling", "random", code=1)
     assert "volume" not in out
     assert err == "tdcr: 8 of 8 rows did not converge: 8 infeasible\n"
+
+
+def strict(text):
+    """JSON as the standard has it: NaN and Infinity are none."""
+
+    def refuse(word):
+        raise AssertionError(word)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_json_has_what_a_script_needs(robot, tmp_path, capsys):
+    forward = ["forward", robot, "-d", "-0.010", "free", "free"]
+    far = ["inverse", robot, "--position", "0.3", "0.1", "0.2"]
+    near = ["inverse", robot, "--position", "0", "0", "0.2"]
+    path = points(tmp_path / "path.csv", path_places()[:3])
+    track = ["track", robot, path, "--model", "constant_curvature"]
+    places = points(tmp_path / "places.csv", tdcr.forward(arm(), PULL).positions)
+    prebend = ["design", "prebend", robot, places, "-d", "-0.010", "free", "free"]
+    always = {"format", "kind", "tdcr", "status", "ok", "robot", "displacements"}
+    for command, code, more in (
+        (forward, 0, {"frames", "positions", "tip", "residual", "units", "tendon_names"}),
+        (near, 0, {"frames", "positions", "tip", "error", "units", "tendon_names"}),
+        (far, 1, {"frames", "positions", "tip", "error", "message", "units", "tendon_names"}),
+        (track, 0, {"error", "targets", "units", "tendon_names"}),
+        (prebend, 0, {"frames", "positions", "error", "message", "units", "tendon_names"}),
+    ):
+        data = strict(run(capsys, *command, "--json", code=code)[0])
+        assert always | more <= data.keys(), command
+        assert np.all(data["ok"]) == (code == 0)
+        if "frames" in more:
+            assert np.array_equal(np.array(data["frames"])[:, :3, 3], data["positions"])
+            assert len(data["tendon_names"]) == len(data["displacements"]) == 3
+
+
+def test_what_a_command_writes_the_next_one_reads(robot, tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    place = ["0.05", "0", "0.18", "--model", "constant_curvature"]
+    run(capsys, "inverse", robot, "--position", *place, "--json", "i.json", "-o", "i.npz", code=1)
+    path = points(tmp_path / "path.csv", path_places()[:3])
+    run(capsys, "track", robot, path, "--model", "constant_curvature", "--json", "t.json")
+    ranges = ["--ranges", "-0.01:0 free free", "--samples", "20", "--sampling", "grid"]
+    run(capsys, "workspace", robot, *ranges, "-o", "w.json")
+    for file, *row in (("i.json",), ("i.npz",), ("t.json", "--row", "2"), ("w.json",)):
+        main(["plot", file, *row, "-o", "p.png"])
+        picture(tmp_path / "p.png")
+        (tmp_path / "p.png").unlink()
+    capsys.readouterr()
+    data = strict(run(capsys, "forward", robot, "-d", "0 0 0", "--json")[0])
+    (tmp_path / "again.json").write_text(json.dumps(data["robot"]))
+    assert tdcr.Robot.load("again.json") == arm()

@@ -103,7 +103,8 @@ def _see_help(error: click.UsageError) -> str:
 
 def _refuse(message: str) -> int:
     """One line on stderr, however many faults there are."""
-    first, *more = message.splitlines() or [""]
+    # A key that is spelt wrong says more than the one that is missing for it.
+    first, *more = sorted(message.splitlines() or [""], key=lambda x: "; did you mean" not in x)
     rest = f" (and {len(more)} more fault{'s' * (len(more) > 1)})" if more else ""
     click.echo(f"tdcr: error: {first}{rest}", err=True)
     return 2

@@ -13,7 +13,7 @@ from tdcr._cli._click import Command, Commands
 
 __all__ = ["design"]
 
-_TARGET = click.argument("target", type=click.Path(path_type=Path))
+_TARGET = click.argument("target", type=own.FILE)
 _CURVE = click.option(
     "--curve",
     is_flag=True,

@@ -28,7 +28,7 @@ def _names(
     ),
 )
 @own.ROBOT
-@click.argument("measurements", type=click.Path(path_type=Path))
+@click.argument("measurements", type=own.FILE)
 @click.option(
     "--unit",
     type=click.Choice(["m", "cm", "mm", "um", "in"]),

@@ -50,7 +50,8 @@ def forward(
         (output, shape.save),
         (plot_file, own.picture_of(shape)),
     )
-    return own.said(shape.ok, shape.robot.name, shape.status, shape.message)
+    doubt = own.unit_doubted(unit, own.largest(pulls), shape.robot)
+    return own.said(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
 
 
 @click.command("schema", epilog=own.examples("schema --output robot.schema.json", files=False))

@@ -40,7 +40,7 @@ __all__ = ["inverse", "track"]
 )
 @click.option(
     "--pose",
-    type=click.Path(path_type=Path),
+    type=own.FILE,
     metavar="FILE",
     help="Instead: the 4x4 frame of the tool by rows, numbers with commas or spaces between them.",
 )
@@ -73,13 +73,14 @@ def inverse(
     answer = tdcr.inverse(arm, target, model=model, bounds=_bounds(bounds, unit))
     marks = answer.target[None, :3, 3] if answer.target.ndim == 2 else answer.target[None]
     own.delivered(
-        lambda: report.as_json(answer),
+        lambda: report.inverse_json(answer),
         lambda: report.print_inverse(answer, unit),
         json_file,
         (output, answer.save),
         (plot_file, lambda path: own.picture_of(answer.shape, marks)(path)),
     )
-    return own.said(answer.ok, arm.name, answer.status, answer.message)
+    doubt = own.unit_doubted(unit, answer.error, arm, times=20)
+    return own.said(answer.ok, arm.name, answer.status, answer.message + doubt)
 
 
 def _bounds(bounds: list[float] | None, unit: str) -> Any:
@@ -132,7 +133,7 @@ def _pose(path: Path, unit: str) -> Any:
     epilog=own.examples("track trunk.toml path.csv --output pulls.csv"),
 )
 @own.ROBOT
-@click.argument("path", type=click.Path(path_type=Path))
+@click.argument("path", type=own.FILE)
 @own.model_option("rod", "constant_curvature")
 @own.BOUNDS
 @own.target_option
@@ -163,10 +164,10 @@ def track(
         arm, targets, model=model, bounds=_bounds(bounds, unit), progress=own.progress()
     )
     own.delivered(
-        lambda: report.as_json(found),
+        lambda: report.track_json(found),
         lambda: report.print_track(found, unit),
         json_file,
         (output, found.save),
         (plot_file, lambda path: own.picture_of(found[-1].shape, targets)(path)),
     )
-    return own.rows_said(found)
+    return own.rows_said(found, own.unit_doubted(unit, float(found.error.max()), arm, times=20))

@@ -19,10 +19,11 @@ from tdcr.errors import InvalidInput
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tdcr import Shape, Workspace
+    from tdcr import Robot, Shape, Workspace
 
 __all__ = [
     "BOUNDS",
+    "FILE",
     "ROBOT",
     "checked_picture",
     "delivered",
@@ -30,6 +31,7 @@ __all__ = [
     "examples",
     "in_metres",
     "json_option",
+    "largest",
     "model_option",
     "output_option",
     "picture_of",
@@ -39,6 +41,7 @@ __all__ = [
     "rows_said",
     "said",
     "target_option",
+    "unit_doubted",
     "unit_option",
     "workspace_picture",
     "writable",
@@ -47,7 +50,10 @@ __all__ = [
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-ROBOT: Callable[[Command], Command] = click.argument("robot", type=click.Path(path_type=Path))
+# Reading says what is wrong with a file, in the same words for all.
+FILE = click.Path(path_type=Path, readable=False)
+
+ROBOT: Callable[[Command], Command] = click.argument("robot", type=FILE)
 
 
 def examples(*commands: str, files: bool = True) -> str:
@@ -116,19 +122,21 @@ def target_option(command: Command) -> Command:
 
 def writable(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
     """Refuse a file that cannot be written before a long solve, not after it."""
-    if path in (None, "-"):
+    if path is None or path == "-":
         return path
-    folder, fault = Path(str(path)).parent, 0
-    if Path(str(path)).is_dir():
+    path = str(path)
+    folder, fault = Path(path).parent, 0
+    if Path(path).is_dir():
         fault = errno.EISDIR
     elif not folder.exists():
         fault = errno.ENOENT
     elif not folder.is_dir():
         fault = errno.ENOTDIR
-    elif not os.access(folder, os.W_OK):
+    elif not os.access(path if os.path.exists(path) else folder, os.W_OK):
+        # Also a file that its owner keeps from being written: no new one takes its place.
         fault = errno.EACCES
     if fault:
-        raise OSError(fault, os.strerror(fault), str(path))
+        raise OSError(fault, os.strerror(fault), path)
     return path
 
 
@@ -273,6 +281,14 @@ def workspace_picture(found: Workspace, path: str, view: str) -> None:
     save_workspace(found, path, view=view)
 
 
+def unit_doubted(unit: str, length: float, robot: Robot, *, times: float = 1.0) -> str:
+    """Say, where a length is so many times the robot's, that it was taken for metres."""
+    own = robot.backbone.total_length
+    if unit != "m" or not length > times * own:
+        return ""
+    return f"; {length:g} m is much for a robot of {own:g} m: add --unit mm if mm are meant"
+
+
 def said(ok: bool, name: str | None, status: str, message: str) -> int:
     """Exit code of an outcome; what did not converge is said on stderr, in one line."""
     if ok:
@@ -283,7 +299,12 @@ def said(ok: bool, name: str | None, status: str, message: str) -> int:
     return 1
 
 
-def rows_said(result: Any) -> int:
+def largest(values: Iterable[float]) -> float:
+    """Give the largest size of what is finite."""
+    return max((abs(value) for value in values if isfinite(value)), default=0.0)
+
+
+def rows_said(result: Any, doubt: str = "") -> int:
     """Exit code of many rows: 1 if any did not converge, and how many did what."""
     from collections import Counter
 
@@ -292,7 +313,7 @@ def rows_said(result: Any) -> int:
     if fine == total:
         return 0
     names = ", ".join(f"{count} {status}" for status, count in counts.most_common())
-    click.echo(f"tdcr: {total - fine} of {total} rows did not converge: {names}", err=True)
+    click.echo(f"tdcr: {total - fine} of {total} rows did not converge: {names}{doubt}", err=True)
     return 1
 
 

@@ -109,4 +109,5 @@ def workspace(
         (output, found.save),
         (plot_file, lambda path: own.workspace_picture(found, path, view)),
     )
-    return own.rows_said(found)
+    longest = own.largest(end for pair in limits for end in pair)
+    return own.rows_said(found, own.unit_doubted(unit, longest, arm))
