@@ -251,7 +251,8 @@ def _label(ax: Any, scene: Scene, title: str | None, legend: bool) -> None:
             fontsize=8,
             frameon=False,
             loc="upper center",
-            bbox_to_anchor=(0.5, -0.12),
+            # Labels of axes in 3-D hang lower than those in a plane.
+            bbox_to_anchor=(0.5, -0.2 if ax.name == "3d" else -0.12),
             ncols=min(count, 4 if count != 6 else 3),
             title="tendons",
             title_fontsize=8,

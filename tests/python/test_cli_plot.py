@@ -159,3 +159,51 @@ def test_an_interrupt_that_the_garbage_collector_swallows_ends_an_animation(
     assert capsys.readouterr().err == "tdcr: interrupted\n"
     assert 3 < len(drawn) < 100
     assert set(tmp_path.iterdir()) == before
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Figures that the commands save."""
+    figure = pytest.importorskip("matplotlib.figure")
+    figures, whole = [], figure.Figure.savefig
+
+    def savefig(self, target, **options):
+        figures.append(self)
+        whole(self, target, **options)
+
+    monkeypatch.setattr(figure.Figure, "savefig", savefig)
+    return figures
+
+
+@pytest.mark.parametrize("pull", ["-15 free free free -5 free", "-12.6 4.1 8.2 -0.8 -0.5 1.3"])
+def test_words_of_a_picture_in_space_are_not_one_over_the_other(pull, robot, drawn, capsys):
+    run(capsys, "demo", "--files", ".")
+    main(["plot", "trunk.toml", "--pull", pull, "--unit", "mm", "--view", "3d", "-o", "p.png"])
+    capsys.readouterr()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(drawn[0])
+    canvas.draw()
+    axes, renderer = drawn[0].axes[0], canvas.get_renderer()
+    labels = [axis.label.get_window_extent(renderer) for axis in (axes.xaxis, axes.yaxis)]
+    legend = axes.get_legend().get_window_extent(renderer)
+    assert not any(legend.overlaps(label) for label in labels)
+    side = axes.zaxis.label.get_window_extent(renderer)
+    ticks = [tick.label1 for tick in axes.zaxis.get_major_ticks()]
+    shown = [tick.get_window_extent(renderer) for tick in ticks if tick.get_text()]
+    assert shown
+    assert not any(side.overlaps(tick) for tick in shown)
+
+
+def test_a_workspace_in_space_is_to_scale(robot, drawn, capsys):
+    """Also of tips in a plane, which is no sliver."""
+    ranges = ["--ranges", "-10:0", "free", "free", "--unit", "mm", "--samples", "50"]
+    out = ["--sampling", "grid", "--view", "3d", "--plot", "p.png"]
+    run(capsys, "workspace", robot, *ranges, *out)
+    axes = drawn[0].axes[0]
+    spans = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()), np.ptp(axes.get_zlim())])
+    box = np.array(axes.get_box_aspect())
+    assert box / box.max() == pytest.approx(spans / spans.max(), rel=1e-6)
+    assert spans.min() >= 0.2 * spans.max()
+    low, high = axes.get_zlim()
+    assert low <= 0.0 < 200.0 <= high

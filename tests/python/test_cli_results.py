@@ -170,11 +170,17 @@ def test_parquet_is_asked_for_before_the_solve(robot, tmp_path, capsys, monkeypa
     assert len(tdcr.Workspace.load("w.parquet")) == 50
 
 
-def test_a_workspace_of_which_nothing_converges(robot, capsys):
+def test_a_workspace_of_which_nothing_converges(robot, tmp_path, capsys):
     command = ["workspace", robot, "--ranges", "-0.02:-0.01", "--samples", "8"]
     out, err = run(capsys, *command, "--sampling", "random", code=1)
     assert "volume" not in out
     assert err == "tdcr: 8 of 8 rows did not converge: 8 infeasible\n"
+    pytest.importorskip("matplotlib")
+    command += ["--plot", "none.png", "-o", "none.npz"]
+    _, err = run(capsys, *command, "--sampling", "random", code=1)
+    assert err == "tdcr: 8 of 8 rows did not converge: 8 infeasible; no picture\n"
+    assert not (tmp_path / "none.png").exists()
+    assert len(tdcr.Workspace.load("none.npz")) == 8
 
 
 def strict(text):

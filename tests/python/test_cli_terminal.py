@@ -29,6 +29,9 @@ LONG = {
                   "--output", "w.npz"],
     "track": ["path.csv", "--output", "t.npz"],
     "plot": ["--pull", "-0.01 -0.004 free", "--animate", "p.gif", "--frames", "500"],
+    "fit": ["bench.csv", "--unit", "mm", "--pull-sign", "negative", "--parameters",
+            "gain,base,radius,azimuth", "-o", "f.toml"],
+    "design routing": ["bend.csv", "-o", "r.toml", "--curve"],
 }  # fmt: skip
 
 
@@ -38,13 +41,19 @@ def test_interrupting_ends_with_130_and_one_line(command, robot, tmp_path):
     angles = np.linspace(0, 60, 100_000)
     circle = np.stack([0.4 * np.cos(angles), 0.4 * np.sin(angles), 0 * angles + 0.3], axis=1)
     points(tmp_path / "path.csv", circle)
+    bend = np.linspace(0, 1.5, 40)[:, None] ** [1, 1.7, 1]
+    bend = np.stack([1 - np.cos(bend[:, 0]), 0.2 * np.sin(3 * bend[:, 1]), np.sin(bend[:, 2])], 1)
+    points(tmp_path / "bend.csv", 0.15 * bend)
+    noise = np.random.default_rng(0).normal([-5, 0, 0, 30, 30, 180], 4, (6000, 6))
+    rows = [",".join(map(str, row)) for row in noise.tolist()]
+    (tmp_path / "bench.csv").write_text("\n".join(["d0,d1,d2,x,y,z", *rows]))
     # A shell's background job starts with SIGINT ignored.
     code = (
         "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from tdcr._cli import main; print('ready', flush=True); sys.exit(main(sys.argv[1:]))"
     )
     before = set(tmp_path.iterdir())
-    arguments = [sys.executable, "-c", code, command, robot, *LONG[command]]
+    arguments = [sys.executable, "-c", code, *command.split(), robot, *LONG[command]]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen(arguments, **pipes) as process:
         assert process.stdout.readline() == "ready\n"

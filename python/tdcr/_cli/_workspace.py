@@ -102,12 +102,14 @@ def workspace(
         model=model,
         progress=own.progress(),
     )
+    nothing = plot_file is not None and not found.ok.any()
     own.delivered(
         lambda: report.workspace_json(found),
         lambda: report.print_workspace(found, unit),
         json_file,
         (output, found.save),
-        (plot_file, lambda path: own.workspace_picture(found, path, view)),
+        (None if nothing else plot_file, lambda path: own.workspace_picture(found, path, view)),
     )
     longest = own.largest(end for pair in limits for end in pair)
-    return own.rows_said(found, own.unit_doubted(unit, longest, arm))
+    doubt = own.unit_doubted(unit, longest, arm)
+    return own.rows_said(found, "; no picture" * nothing + doubt)
