@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "as_json",
     "console_of",
+    "contact_tables",
     "facts_table",
     "print_demo",
     "print_shape",
@@ -75,7 +76,32 @@ def print_shape(shape: Shape, unit: str) -> None:
         row += [f"{length * scale:.{digits}f}" for length in lengths]
         row += [f"{shape.tensions[k]:.6g}"] if known else []
         tendons.add_row(text_of(name), *row)
-    show(console, facts, tendons)
+    show(console, facts, tendons, *contact_tables(console, shape, unit))
+
+
+def contact_tables(console: Console, shape: Shape, unit: str) -> list[Table]:
+    """Table of the contacts, where there are obstacles."""
+    if not shape.obstacles:
+        return []
+    force = "N" if shape.units == "N" else "EI/m^2"
+    headers = ("at", "obstacle", f"x [{unit}]", f"y [{unit}]", f"z [{unit}]", f"force [{force}]")
+    table = table_of(console, "contact", *headers)
+    scale, digits = (1000.0, 3) if unit == "mm" else (1.0, 6)
+    for contact in shape.contacts:
+        names = shape.robot.tendon_names
+        tendon = "" if contact.tendon is None else f" of {names[contact.tendon]}"
+        kind = type(shape.obstacles[contact.obstacle]).__name__
+        place = [f"{value * scale + 0.0:.{digits}f}" for value in contact.point]
+        table.add_row(
+            f"disk {contact.disk}",
+            text_of(f"{contact.kind}{tendon}"),
+            f"{contact.obstacle} ({kind})",
+            *place,
+            f"{float(np.linalg.norm(contact.force)):.6g}",
+        )
+    if not shape.contacts:
+        table.add_row("none")
+    return [table]
 
 
 def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:

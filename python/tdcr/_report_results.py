@@ -10,7 +10,16 @@ import numpy as np
 from tdcr._container import header_text
 from tdcr._core import _rotation_vector
 from tdcr._objects import described
-from tdcr._report import as_json, console_of, facts_table, show, table_of, text_of, vector_text
+from tdcr._report import (
+    as_json,
+    console_of,
+    contact_tables,
+    facts_table,
+    show,
+    table_of,
+    text_of,
+    vector_text,
+)
 
 if TYPE_CHECKING:
     from tdcr._core import Robot
@@ -125,7 +134,8 @@ def print_inverse(answer: Inverse, unit: str) -> None:
         turned = math.degrees(answer.rotation_error)
         facts.append(("angle to the target [deg]", f"{turned:.3g}"))
     pulls = _pulls(console, answer.robot, unit, answer.displacements, answer.tensions)
-    show(console, facts_table(console, *facts), pulls)
+    touched = contact_tables(console, answer.shape, unit) if answer.obstacles else []
+    show(console, facts_table(console, *facts), pulls, *touched)
 
 
 def print_track(found: InverseBatch, unit: str) -> None:

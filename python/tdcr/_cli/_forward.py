@@ -10,6 +10,7 @@ import tdcr
 from tdcr import Robot
 from tdcr._cli import _shared as own
 from tdcr._cli._click import Command
+from tdcr._cli._obstacles import obstacles_option, read_obstacles
 
 __all__ = ["forward", "schema"]
 
@@ -18,13 +19,16 @@ __all__ = ["forward", "schema"]
     "forward",
     cls=Command,
     epilog=own.examples(
-        "forward trunk.toml -d -15 free free free -5 free --unit mm --output pulled.npz"
+        "forward trunk.toml -d -15 free free free -5 free --unit mm --output pulled.npz",
+        "forward trunk.toml -d -15 free free free free free --unit mm --obstacles bar.toml "
+        "--output leaning.npz",
     ),
 )
 @own.ROBOT
 @own.displacements_option()
 @own.model_option("rod", "linkage", "constant_curvature")
 @own.unit_option("the displacements")
+@obstacles_option
 @own.json_option
 @own.picture_option
 @own.output_option("the shape", ".npz", ".json", ".csv")
@@ -33,6 +37,7 @@ def forward(
     displacements: list[float],
     model: str,
     unit: str,
+    obstacles: Path | None,
     json_file: str | None,
     plot_file: str | None,
     output: str | None,
@@ -42,7 +47,8 @@ def forward(
 
     own.checked_picture(plot_file)
     pulls = own.in_metres(displacements, unit)
-    shape = tdcr.forward(Robot.load(robot), pulls, model=model)
+    arm, around = Robot.load(robot), read_obstacles(obstacles)
+    shape = tdcr.forward(arm, pulls, model=model, obstacles=around)
     own.delivered(
         lambda: _report.as_json(shape),
         lambda: _report.print_shape(shape, unit),

@@ -11,6 +11,7 @@ import tdcr
 from tdcr import InvalidInput, Robot
 from tdcr._cli import _shared as own
 from tdcr._cli._click import Command, Numbers
+from tdcr._cli._obstacles import obstacles_option, read_obstacles
 
 __all__ = ["inverse", "track"]
 
@@ -47,6 +48,7 @@ __all__ = ["inverse", "track"]
 @own.model_option("rod", "constant_curvature")
 @own.BOUNDS
 @own.unit_option("the position, the bounds, the last column of a pose")
+@obstacles_option
 @own.json_option
 @own.picture_option
 @own.output_option("the answer", ".npz", ".json")
@@ -58,6 +60,7 @@ def inverse(
     model: str,
     bounds: list[float] | None,
     unit: str,
+    obstacles: Path | None,
     json_file: str | None,
     plot_file: str | None,
     output: str | None,
@@ -70,7 +73,13 @@ def inverse(
     own.checked_picture(plot_file)
     arm = Robot.load(robot)
     target = _pose(pose, unit) if pose is not None else _target(position, rotation, unit)
-    answer = tdcr.inverse(arm, target, model=model, bounds=_bounds(bounds, unit))
+    answer = tdcr.inverse(
+        arm,
+        target,
+        model=model,
+        bounds=_bounds(bounds, unit),
+        obstacles=read_obstacles(obstacles),
+    )
     marks = answer.target[None, :3, 3] if answer.target.ndim == 2 else answer.target[None]
     own.delivered(
         lambda: report.inverse_json(answer),
@@ -137,6 +146,7 @@ def _pose(path: Path, unit: str) -> Any:
 @own.model_option("rod", "constant_curvature")
 @own.BOUNDS
 @own.target_option
+@obstacles_option
 @own.json_option
 @own.picture_option
 @own.output_option("the pulls of every row", ".csv", ".npz", ".json", ".parquet")
@@ -146,6 +156,7 @@ def track(
     model: str,
     bounds: list[float] | None,
     unit: str | None,
+    obstacles: Path | None,
     json_file: str | None,
     plot_file: str | None,
     output: str | None,
@@ -161,7 +172,12 @@ def track(
     arm = Robot.load(robot)
     targets, unit = own.points(path, unit)
     found = tdcr.track(
-        arm, targets, model=model, bounds=_bounds(bounds, unit), progress=own.progress()
+        arm,
+        targets,
+        model=model,
+        bounds=_bounds(bounds, unit),
+        obstacles=read_obstacles(obstacles),
+        progress=own.progress(),
     )
     own.delivered(
         lambda: report.track_json(found),

@@ -11,6 +11,7 @@ import tdcr
 from tdcr import Robot
 from tdcr._cli import _shared as own
 from tdcr._cli._click import Command, Numbers, read_numbers
+from tdcr._cli._obstacles import obstacles_option, read_obstacles
 
 __all__ = ["workspace"]
 
@@ -60,6 +61,7 @@ def _ranges(
 @click.option("--seed", type=int, default=0, show_default=True, help="Of sobol and random.")
 @own.model_option("rod", "linkage", "constant_curvature")
 @own.unit_option("the ranges")
+@obstacles_option
 @own.json_option
 @own.picture_option
 @click.option(
@@ -78,6 +80,7 @@ def workspace(
     seed: int,
     model: str,
     unit: str,
+    obstacles: Path | None,
     json_file: str | None,
     plot_file: str | None,
     view: str,
@@ -100,6 +103,7 @@ def workspace(
         sampling=sampling,  # type: ignore[arg-type]
         seed=seed,
         model=model,
+        obstacles=read_obstacles(obstacles),
         progress=own.progress(),
     )
     nothing = plot_file is not None and not found.ok.any()
