@@ -131,6 +131,15 @@ def test_fit_wants_a_column_for_every_tendon(measured, capsys):
     assert f"{expected}, got d_front, d_left" in err
 
 
+def test_fit_refuses_pulls_of_the_other_sign(measured, tmp_path, capsys):
+    table = tmp_path / "m.csv"
+    head, *rows = [line for line in table.read_text().splitlines() if not line.startswith("1,")]
+    table.write_text("\n".join([head, *rows[:20]]))
+    measured[measured.index("positive")] = "negative"
+    _, err = run(capsys, *measured, "--parameters", "gain", code=2)
+    assert err.endswith("m.csv: expected a pull, got releases alone: try --pull-sign positive\n")
+
+
 @pytest.mark.parametrize("missing", ["--unit", "--pull-sign"])
 def test_fit_has_no_default_for_unit_and_sign(measured, missing, capsys):
     at = measured.index(missing)

@@ -112,6 +112,12 @@ def fit(
             f"got {', '.join(columns)}; name them with --displacement-columns",
             "displacements",
         )
+    slack = not (measured.displacements < 0.0).any()
+    if slack and options["model"] == "rod" and "offset" not in parameters:
+        # Slack tendons tell nothing: the parameters would stay what they were.
+        other = {"positive": "negative", "negative": "positive"}[options["pull_sign"]]
+        message = f"{measurements}: expected a pull, got releases alone: try --pull-sign {other}"
+        raise InvalidInput(message, "pull_sign")
     found = solve(
         arm,
         measured,
