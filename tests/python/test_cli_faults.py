@@ -286,3 +286,34 @@ def test_files_that_cannot_be_read_are_one_line(
     assert err.startswith(f"tdcr: error: {name}: ")
     said = {"none": "No such file", "folder": "Is a directory", "unreadable": "Permission denied"}
     assert said.get(kind, "") in err
+
+
+FIT = ["fit", "arm.toml", "path.csv", "--unit", "mm", "--pull-sign", "positive"]
+FIT += ["--parameters", "gain"]
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        (["forward", "arm.toml", "-d", "0 0 0", "--json", "./arm.toml"], "--json: .* reads too"),
+        (["forward", "arm.toml", "-d", "0 0 0", "-o", "s.json", "--json", "s.json"], "writes too"),
+        (["plot", "s.png.json", "-o", "s.png.json"], "--output: .* which the command reads too"),
+        (["plot", "arm.toml", "-d", "0 0 0", "-o", "p.gif", "--animate", "p.gif"], "writes too"),
+        (["track", "arm.toml", "path.csv", "-o", "link.csv"], "--output: .* reads too"),
+        (["design", "prebend", "arm.toml", "path.csv", "-d", "0 0 0", "-o", "arm.toml"], "reads"),
+        (
+            [*FIT, "-o", "arm.toml"],
+            "--output: expected a file of its own, got arm.toml, which the command reads too",
+        ),
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_file_that_is_read_is_not_written_over(command, text, robot, tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    (tmp_path / "path.csv").write_text("x [m],y [m],z [m]\n0,0,0.2\n")
+    (tmp_path / "link.csv").symlink_to("path.csv")
+    arm().save("s.png.json")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    _, err = run(capsys, *command, code=2)
+    assert re.search(text, err)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

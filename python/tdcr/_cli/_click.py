@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from _thread import interrupt_main
@@ -9,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from math import inf, isfinite, nan
+from pathlib import Path
 from threading import Timer
 from typing import Any
 
@@ -109,8 +111,28 @@ class Numbers(click.Option):
         super().__init__(*names, **{"callback": read} | given)
 
 
+_OUTPUTS = ("output", "json_file", "plot_file", "animate")
+
+
 class Command(click.Command):
-    """A command whose options for numbers take as many words as follow."""
+    """A command whose options for numbers take as many words as follow.
+
+    It writes no file over one that it reads, nor two into one.
+    """
+
+    def invoke(self, context: click.Context) -> Any:
+        given = {name: value for name, value in context.params.items() if value is not None}
+        taken = {os.path.realpath(v): "reads" for v in given.values() if isinstance(v, Path)}
+        for name in _OUTPUTS:
+            file = os.path.realpath(given.get(name, "-"))
+            if given.get(name, "-") == "-" or (os.path.exists(file) and not os.path.isfile(file)):
+                continue
+            if file in taken:
+                option = next(p.opts[-1] for p in self.params if p.name == name)
+                got = f"{given[name]}, which the command {taken[file]} too"
+                raise click.UsageError(f"{option}: expected a file of its own, got {got}", context)
+            taken[file] = "writes"
+        return super().invoke(context)
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
         options = {n for p in self.params if isinstance(p, Numbers) for n in p.opts}

@@ -9,6 +9,7 @@ import click
 
 from tdcr import InvalidInput, Robot, read_measurements
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command
 
 __all__ = ["fit"]
 
@@ -22,6 +23,7 @@ def _names(
 
 @click.command(
     "fit",
+    cls=Command,
     epilog=own.examples(
         "fit finger.toml bench.csv --unit mm --pull-sign positive --parameters gain "
         "--output fitted.toml"
