@@ -247,7 +247,9 @@ class Solid:
         for axis, name in enumerate("xyz"):
             half = 0.5 * span[axis]
             getattr(ax, f"set_{name}lim")(middle[axis] - half, middle[axis] + half)
-            getattr(ax, f"set_{name}label")(f"{name} [{unit}]", fontsize=9)
+            # Numbers of three digits reach into the label of z.
+            pad = 9 if name == "z" else 4
+            getattr(ax, f"set_{name}label")(f"{name} [{unit}]", fontsize=9, labelpad=pad)
             spread = round(6 * span[axis] / span.max())
             getattr(ax, f"{name}axis").set_major_locator(_locator(max(2, spread)))
             pane = getattr(ax, f"{name}axis")

@@ -160,6 +160,8 @@ def _read_npz(path: StrPath) -> Any:
             if isinstance(error, InvalidInput):
                 raise
             fault = " ".join(str(error).split()) or type(error).__name__
+            # numpy takes what it does not know for a pickle, and advises to trust it.
+            fault = "no archive" if "If you trust" in fault else fault
             message = f"{shown}: not an npz file, or one that is cut off or damaged: {fault}"
             raise InvalidInput(message, "path") from None
     header = arrays.pop("header", None)

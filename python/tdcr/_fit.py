@@ -130,10 +130,11 @@ class Fit(Value):
         part: Part = "validation" if self.validation.any() else "train"
         for before, colour, label in ((True, "#9AA5B1", "before"), (False, "#C8553D", "after")):
             distances = np.sort(self.distances(part, before=before)) * 1e3
-            share = np.arange(1, len(distances) + 1) / len(distances)
-            mean = self.mean(part, before=before) * 1e3
-            ax.step(distances, share, color=colour, label=f"{label}, mean {mean:.1f} mm")
-        ax.set(xlabel="distance [mm]", ylabel=f"share of the {part} points", ylim=(0, 1))
+            share = np.arange(len(distances) + 1) / len(distances)
+            label = f"{label}, mean {self.mean(part, before=before) * 1e3:.3g} mm"
+            ax.step([0.0, *distances], share, where="post", color=colour, label=label)
+        whose = {"validation": "held-out", "train": "fitted"}[part]
+        ax.set(xlabel="distance [mm]", ylabel=f"share of the {whose} points", ylim=(0, 1.03))
         ax.grid(True)
         ax.legend(frameon=False)
         return ax

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from tdcr._canvas import Flat, Points, Scene, Solid, Unit, draw, draw_forces, draw_marks, places_of
+from tdcr._replace import replace_file
 from tdcr._view import Plane, plane_of
 from tdcr.errors import InvalidInput
 
@@ -22,7 +23,15 @@ if TYPE_CHECKING:
 
     from tdcr._core import Shape
 
-__all__ = ["FAILED", "check_picture", "one_of", "plot_shape", "require_matplotlib", "save_picture"]
+__all__ = [
+    "FAILED",
+    "check_picture",
+    "one_of",
+    "plot_shape",
+    "require_matplotlib",
+    "save_figure",
+    "save_picture",
+]
 
 View = Literal["auto", "2d", "3d"]
 
@@ -140,7 +149,16 @@ def save_picture(shape: Shape, path: str | os.PathLike[str], **options: Any) -> 
     places = None if marks is None else places_of(marks)
     flat = _is_flat(shape, options.get("view", "auto"), plane_of(shape), None, places)
     plot_shape(shape, ax=_axes(figure, flat), **options)
-    figure.savefig(path, dpi=160, bbox_inches="tight")
+    save_figure(figure, path)
+
+
+def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure, by the ending of the path; the file appears complete or not at all."""
+    kind = os.path.splitext(path)[1][1:].lower()
+    replace_file(
+        path,
+        lambda stream: figure.savefig(stream, format=kind, dpi=160, bbox_inches="tight"),
+    )
 
 
 def check_picture(path: str | os.PathLike[str]) -> None:
@@ -233,7 +251,8 @@ def _label(ax: Any, scene: Scene, title: str | None, legend: bool) -> None:
             fontsize=8,
             frameon=False,
             loc="upper center",
-            bbox_to_anchor=(0.5, -0.12),
+            # Labels of axes in 3-D hang lower than those in a plane.
+            bbox_to_anchor=(0.5, -0.2 if ax.name == "3d" else -0.12),
             ncols=min(count, 4 if count != 6 else 3),
             title="tendons",
             title_fontsize=8,

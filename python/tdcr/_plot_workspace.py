@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from tdcr._plot import check_picture, one_of, require_matplotlib
+from tdcr._plot import check_picture, one_of, require_matplotlib, save_figure
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -59,15 +59,19 @@ def plot_workspace(
     if unit == "auto":
         unit = "mm" if workspace.robot.backbone.total_length < 2.0 else "m"
     scale = 1000.0 if unit == "mm" else 1.0
-    painted = _solid(ax, seen, scale) if solid else _section(ax, seen, scale)
+    painted = _solid(ax, workspace, seen, scale) if solid else _section(ax, seen, scale)
     _spine(ax, workspace, scale, solid)
+    if solid:
+        _finish(ax, workspace, seen, scale)
     ax.set_xlabel(f"x [{unit}]")
     if not solid:
         ax.set_ylabel(f"z [{unit}]")
     else:
         ax.set_ylabel(f"y [{unit}]")
-        ax.set_zlabel(f"z [{unit}]")
-    bar = ax.figure.colorbar(painted, ax=ax, shrink=0.8 if solid else 1.0)
+        ax.set_zlabel(f"z [{unit}]", labelpad=8)
+    bar = ax.figure.colorbar(
+        painted, ax=ax, shrink=0.8 if solid else 1.0, pad=0.12 if solid else 0.05
+    )
     bar.set_label(_LABELS[value])
     bar.outline.set_linewidth(0.6)
     text = _title(workspace) if title is None else title
@@ -84,7 +88,7 @@ def save_workspace(workspace: Workspace, path: str | os.PathLike[str], **options
 
     figure = Figure(figsize=_SIZE, layout="constrained")
     plot_workspace(workspace, ax=_axes(figure, options.get("view") == "3d"), **options)
-    figure.savefig(path, dpi=160, bbox_inches="tight")
+    save_figure(figure, path)
 
 
 def _axes(figure: Figure, solid: bool) -> Axes:
@@ -133,28 +137,47 @@ def _section(ax: Any, seen: VoxelMap, scale: float) -> Any:
     return painted
 
 
-def _solid(ax: Any, seen: VoxelMap, scale: float) -> Any:
+def _solid(ax: Any, workspace: Workspace, seen: VoxelMap, scale: float) -> Any:
     """Centres of the voxels behind the plane y = 0, so that one looks inside."""
     behind = seen.centers[:, 1] > 0.0
     behind = behind if behind.any() else np.ones(len(behind), bool)
     points = seen.centers[behind] * scale
-    span = np.maximum(np.ptp(points, axis=0), 1e-9 * scale)
+    whole = np.concatenate([seen.centers, _backbone(workspace)]) * scale
     # Squares about as wide as a voxel: 4 inches hold the longest span.
-    size = (4.0 * 72.0 * seen.voxel * scale / span.max()) ** 2
+    size = (4.0 * 72.0 * seen.voxel * scale / np.ptp(whole, axis=0).max()) ** 2
     painted = ax.scatter(
         *points.T, c=seen.values[behind], s=size, marker="s", linewidths=0, depthshade=False
     )
     painted.set_clim(0.0, float(seen.values.max()))
-    ax.set_aspect("equal")
-    ax.locator_params(nbins=4)
     ax.view_init(elev=22, azim=-65)
     return painted
 
 
+def _finish(ax: Any, workspace: Workspace, seen: VoxelMap, scale: float) -> None:
+    """Equal scale in a box around voxels and backbone, which is never a sliver."""
+    from matplotlib.ticker import MaxNLocator
+
+    shown = np.concatenate([seen.centers, _backbone(workspace)]) * scale
+    low, high = shown.min(axis=0), shown.max(axis=0)
+    span = np.maximum(1.05 * (high - low), 0.25 * (high - low).max())
+    for axis, name in enumerate("xyz"):
+        middle = 0.5 * (low[axis] + high[axis])
+        getattr(ax, f"set_{name}lim")(middle - span[axis] / 2, middle + span[axis] / 2)
+        ticks = max(2, round(5 * span[axis] / span.max()))
+        getattr(ax, f"{name}axis").set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
+    ax.tick_params(labelsize=8)
+    ax.set_box_aspect(span)
+
+
+def _backbone(workspace: Workspace) -> Any:
+    """Places of the disks at rest in the frame of the base."""
+    frames = np.linalg.inv(workspace.robot.base) @ workspace.robot.rest_frames
+    return frames[:, :3, 3]
+
+
 def _spine(ax: Any, workspace: Workspace, scale: float, solid: bool) -> None:
     """Draw the backbone at rest, from its base."""
-    frames = np.linalg.inv(workspace.robot.base) @ workspace.robot.rest_frames
-    points = frames[:, :3, 3].T * scale
+    points = _backbone(workspace).T * scale
     shown = points if solid else points[[0, 2]]
     ax.plot(*shown, color="#5F6670", linewidth=2.0, zorder=3.0)
     ax.plot(*shown[:, :1], color="#22262B", marker="s", markersize=6, zorder=3.1)

@@ -21,22 +21,27 @@ if TYPE_CHECKING:
 __all__ = [
     "as_json",
     "console_of",
+    "contact_tables",
     "facts_table",
     "print_demo",
     "print_shape",
+    "show",
     "table_of",
     "text_of",
     "vector_text",
 ]
 
 
-def as_json(result: Any) -> str:
-    """Write a result as JSON text: what its `save` writes into a .json file."""
+_WIDE = 10_000  # columns, more than any table has
+
+
+def as_json(result: Any, **more: Any) -> str:
+    """Write a result as JSON text: what its `save` writes into a .json file, and more fields."""
     from tdcr._container import header_text
     from tdcr._save_kinds import KINDS
 
     kind = type(result).__name__
-    return header_text(kind, KINDS[kind].said(result))
+    return header_text(kind, KINDS[kind].said(result) | more)
 
 
 def print_shape(shape: Shape, unit: str) -> None:
@@ -71,9 +76,32 @@ def print_shape(shape: Shape, unit: str) -> None:
         row += [f"{length * scale:.{digits}f}" for length in lengths]
         row += [f"{shape.tensions[k]:.6g}"] if known else []
         tendons.add_row(text_of(name), *row)
-    console.print(facts)
-    console.print()
-    console.print(tendons)
+    show(console, facts, tendons, *contact_tables(console, shape, unit))
+
+
+def contact_tables(console: Console, shape: Shape, unit: str) -> list[Table]:
+    """Table of the contacts, where there are obstacles."""
+    if not shape.obstacles:
+        return []
+    force = "N" if shape.units == "N" else "EI/m^2"
+    headers = ("at", "obstacle", f"x [{unit}]", f"y [{unit}]", f"z [{unit}]", f"force [{force}]")
+    table = table_of(console, "contact", *headers)
+    scale, digits = (1000.0, 3) if unit == "mm" else (1.0, 6)
+    for contact in shape.contacts:
+        names = shape.robot.tendon_names
+        tendon = "" if contact.tendon is None else f" of {names[contact.tendon]}"
+        kind = type(shape.obstacles[contact.obstacle]).__name__
+        place = [f"{value * scale + 0.0:.{digits}f}" for value in contact.point]
+        table.add_row(
+            f"disk {contact.disk}",
+            text_of(f"{contact.kind}{tendon}"),
+            f"{contact.obstacle} ({kind})",
+            *place,
+            f"{float(np.linalg.norm(contact.force)):.6g}",
+        )
+    if not shape.contacts:
+        table.add_row("none")
+    return [table]
 
 
 def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
@@ -109,7 +137,7 @@ def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
             f"{time * 1e6:.1f}",
         )
         table.add_section()
-    console.print(table)
+    show(console, table)
 
 
 def facts_table(console: Console, *facts: tuple[str, str]) -> Table:
@@ -152,6 +180,30 @@ def console_of() -> Console:
     return Console(highlight=False) if sys.stdout.isatty() else Console(
         highlight=False, width=400, no_color=True
     )  # fmt: skip
+
+
+def show(console: Console, *tables: Table) -> None:
+    """Print tables with an empty line between them, whole.
+
+    A terminal that is too narrow breaks their lines: a number that lost its last digits would look
+    like another one.
+    """
+    for index, table in enumerate(tables):
+        if index:
+            console.print()
+        if console.is_terminal:
+            wide = console.options.update(max_width=_WIDE)
+            fixed = all(column.no_wrap for column in table.columns)
+            width = console.measure(table, options=wide).maximum if fixed else 0
+            console.width = max(width, console.width)
+            console.print(table)
+            continue
+        with console.capture() as captured:
+            console.print(table)
+        # Without the blanks that fill columns up.
+        lines = captured.get().rstrip("\n").split("\n")
+        console.file.write("".join(f"{line.rstrip()}\n" for line in lines))
+    console.file.flush()
 
 
 def table_of(console: Console, *headers: str) -> Table:

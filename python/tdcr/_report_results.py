@@ -10,7 +10,16 @@ import numpy as np
 from tdcr._container import header_text
 from tdcr._core import _rotation_vector
 from tdcr._objects import described
-from tdcr._report import as_json, console_of, facts_table, table_of, text_of, vector_text
+from tdcr._report import (
+    as_json,
+    console_of,
+    contact_tables,
+    facts_table,
+    show,
+    table_of,
+    text_of,
+    vector_text,
+)
 
 if TYPE_CHECKING:
     from tdcr._core import Robot
@@ -22,14 +31,15 @@ if TYPE_CHECKING:
     from tdcr.design import Prebend
 
 __all__ = [
-    "as_json",
     "design_json",
     "fit_json",
+    "inverse_json",
     "print_design",
     "print_fit",
     "print_inverse",
     "print_track",
     "print_workspace",
+    "track_json",
     "workspace_json",
 ]
 
@@ -64,8 +74,8 @@ def _name(robot: Robot) -> tuple[str, str]:
     return "robot", robot.name or "unnamed"
 
 
-def _print_pulls(console: Any, robot: Robot, unit: str, displacements: Any, tensions: Any) -> None:
-    """Print what each tendon does."""
+def _pulls(console: Any, robot: Robot, unit: str, displacements: Any, tensions: Any) -> Any:
+    """Table of what each tendon does."""
     scale, digits = _scaled(unit)
     known = bool(np.isfinite(tensions).any())
     spine = robot.backbone
@@ -77,11 +87,31 @@ def _print_pulls(console: Any, robot: Robot, unit: str, displacements: Any, tens
         by = displacements[k]
         row = ["free" if math.isinf(by) else f"{by * scale:+.{digits}f}"]
         table.add_row(text_of(name), *row, *([f"{_told(tensions[k], least):.6g}"] if known else []))
-    console.print(table)
+    return table
 
 
 def _told(value: float, least: float) -> float:
     return 0.0 if abs(value) <= least else value
+
+
+def inverse_json(answer: Inverse) -> str:
+    """Write an inverse as JSON that `Inverse.load` reads, with the shape for other readers."""
+    shape = answer.shape
+    return as_json(
+        answer,
+        ok=answer.ok,
+        units=shape.units,
+        tendon_names=list(shape.robot.tendon_names),
+        frames=shape.frames,
+        positions=shape.positions,
+        tip=shape.tip,
+    )
+
+
+def track_json(found: InverseBatch) -> str:
+    """Write a track as JSON that `InverseBatch.load` reads, with names for other readers."""
+    units = found[0].shape.units
+    return as_json(found, units=units, tendon_names=list(found.robot.tendon_names))
 
 
 def print_inverse(answer: Inverse, unit: str) -> None:
@@ -103,9 +133,9 @@ def print_inverse(answer: Inverse, unit: str) -> None:
     if frame:
         turned = math.degrees(answer.rotation_error)
         facts.append(("angle to the target [deg]", f"{turned:.3g}"))
-    console.print(facts_table(console, *facts))
-    console.print()
-    _print_pulls(console, answer.robot, unit, answer.displacements, answer.tensions)
+    pulls = _pulls(console, answer.robot, unit, answer.displacements, answer.tensions)
+    touched = contact_tables(console, answer.shape, unit) if answer.obstacles else []
+    show(console, facts_table(console, *facts), pulls, *touched)
 
 
 def print_track(found: InverseBatch, unit: str) -> None:
@@ -122,23 +152,22 @@ def print_track(found: InverseBatch, unit: str) -> None:
         ("points sought anew, where the arm may jump", str(restarted)),
         (f"largest distance to a point [{unit}]", _length(float(found.error.max()), unit)),
     ]
-    console.print(facts_table(console, *facts))
-    console.print()
+    tables = [facts_table(console, *facts)]
     headers = [f"{what} [{unit}]" for what in ("first", "least", "greatest", "last")]
     table = table_of(console, "tendon", *headers)
     for k, name in enumerate(found.robot.tendon_names):
         row = (pulls[0, k], low[k], high[k], pulls[-1, k])
         table.add_row(text_of(name), *(f"{value:+.{digits}f}" for value in row))
-    console.print(table)
+    tables.append(table)
     failed = np.flatnonzero(~found.ok)
     if len(failed):
         worst = failed[np.argsort(-found.error[failed], kind="stable")][:_WORST]
-        console.print()
         table = table_of(console, "worst row", "status", f"distance [{unit}]")
         for row in sorted(worst):
             status = str(found.status[row])
             table.add_row(str(row), status, _length(float(found.error[row]), unit))
-        console.print(table)
+        tables.append(table)
+    show(console, *tables)
 
 
 def _workspace_facts(found: Workspace) -> dict[str, Any]:
@@ -190,12 +219,16 @@ def print_workspace(found: Workspace, unit: str) -> None:
                 f"voxels of {facts['voxel'] * scale:.3g} {unit}",
             ),
         ]
-    console.print(facts_table(console, *rows))
+    show(console, facts_table(console, *rows))
 
 
 def design_json(found: Any) -> str:
     """Write a design as JSON."""
     own = {
+        "ok": found.ok,
+        "units": found.shape.units,
+        "tendon_names": list(found.robot.tendon_names),
+        "frames": found.shape.frames,
         "status": found.status,
         "message": found.message,
         "iterations": found.iterations,
@@ -231,27 +264,27 @@ def print_design(found: Prebend | Routing, unit: str) -> None:
     elif found.robot.backbone.rest is not None:
         bends = np.degrees(np.linalg.norm(found.robot.backbone.rest, axis=1))
         facts.append(("rest bend of a subsegment, at most [deg]", f"{bends.max():.3f}"))
-    console.print(facts_table(console, *facts))
-    console.print()
-    _print_pulls(console, found.robot, unit, found.shape.displacements, found.shape.tensions)
+    pulls = _pulls(console, found.robot, unit, found.shape.displacements, found.shape.tensions)
+    tables = [facts_table(console, *facts), pulls]
     holes = getattr(found, "holes", None)
     if holes is not None:
-        console.print()
         table = table_of(console, "tendon", "holes of disks 0 to its end")
         # Long lists go on in the next line.
         table.columns[1].no_wrap, table.columns[1].justify = False, "left"
         for name, own in zip(found.robot.tendon_names, holes, strict=True):
             table.add_row(text_of(name), " ".join(map(str, own)))
-        console.print(table)
+        tables.append(table)
+    show(console, *tables)
 
 
 def _parts(found: Fit) -> list[str]:
     return ["train", *(["validation"] if found.validation.any() else [])]
 
 
-def fit_json(found: Fit) -> str:
+def fit_json(found: Fit, measured: Measurements) -> str:
     """Write a fit as JSON."""
     own: dict[str, Any] = {
+        "ok": found.ok,
         "status": found.status,
         "message": found.message,
         "iterations": found.iterations,
@@ -260,7 +293,7 @@ def fit_json(found: Fit) -> str:
         "standard_errors": found.standard_errors,
         "rows": found.rows,
         "validation": found.validation,
-        "dropped": found.dropped,
+        "dropped": measured.dropped,
         "failed": found.failed,
         "robot": found.robot,
     }
@@ -288,21 +321,17 @@ def print_fit(found: Fit, measured: Measurements, unit: str) -> None:
         pair = (found.rms(part, before=b) for b in (True, False))  # type: ignore[arg-type]
         before, after = (_length(value, unit) for value in pair)
         facts.append((f"root mean square distance, {name} [{unit}]", f"{before} -> {after}"))
-    console.print(facts_table(console, *facts))
-    console.print()
     # Columns are found by their order: a person sees whether it is that of the tendons.
-    table = table_of(console, "tendon", "displacements in column")
+    columns = table = table_of(console, "tendon", "displacements in column")
     table.columns[1].justify = "left"
     for name, column in zip(found.robot.tendon_names, measured.displacement_columns, strict=True):
         table.add_row(text_of(name), text_of(column))
-    console.print(table)
-    console.print()
     table = table_of(console, "parameter", "value", "standard error")
     for name, values in found.parameters.items():
         for i, (value, error) in enumerate(zip(values, found.standard_errors[name], strict=True)):
             label = text_of(_parameter(found.robot, name, i, len(values)))
             table.add_row(label, f"{value:.6g}", f"{error:.2g}")
-    console.print(table)
+    show(console, facts_table(console, *facts), columns, table)
 
 
 def _parameter(robot: Robot, name: str, i: int, count: int) -> str:

@@ -9,10 +9,11 @@ import click
 
 from tdcr import InvalidInput, Robot, RoutingSettings
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command, Commands
 
 __all__ = ["design"]
 
-_TARGET = click.argument("target", type=click.Path(path_type=Path))
+_TARGET = click.argument("target", type=own.FILE)
 _CURVE = click.option(
     "--curve",
     is_flag=True,
@@ -21,7 +22,11 @@ _CURVE = click.option(
 
 
 @click.group(
-    "design", epilog="Example: tdcr design prebend trunk.toml shape.csv --pull -5 --output new.toml"
+    "design",
+    cls=Commands,
+    epilog=own.examples(
+        "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
+    ),
 )
 def design() -> None:
     """Find the robot that takes a wanted shape."""
@@ -48,18 +53,22 @@ def _done(found: Any, unit: str, json_file: str | None, files: tuple[str | None,
     from tdcr import _report_results as report
 
     output, plot_file = files
-    own.printed(
-        json_file, lambda: report.design_json(found), lambda: report.print_design(found, unit)
+    own.delivered(
+        lambda: report.design_json(found),
+        lambda: report.print_design(found, unit),
+        json_file,
+        (output, found.robot.save),
+        (plot_file, own.picture_of(found.shape, found.target_positions)),
     )
-    own.written(output, found.robot.save)
-    own.picture(found.shape, plot_file, found.target_positions)
     return own.said(found.ok, found.robot.name, found.status, found.message)
 
 
 @design.command(
     "prebend",
-    epilog="\b\nExample:\n  tdcr design prebend finger.toml shape.csv --pull -5 --unit mm "
-    "--output bent.toml",
+    cls=Command,
+    epilog=own.examples(
+        "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
+    ),
 )
 @own.ROBOT
 @_TARGET
@@ -95,8 +104,10 @@ def prebend(
 
 @design.command(
     "routing",
-    epilog="\b\nExample:\n  tdcr design routing trunk.toml shape.csv --holes 12 --bounds -20 0 "
-    "--unit mm --output routed.toml",
+    cls=Command,
+    epilog=own.examples(
+        "design routing finger.toml places.csv --holes 12 --bounds -10 0 --output routed.toml"
+    ),
 )
 @own.ROBOT
 @_TARGET
@@ -107,13 +118,7 @@ def prebend(
     show_default=True,
     help="Holes per disk, evenly spaced; 0 allows any azimuth.",
 )
-@click.option(
-    "--bounds",
-    nargs=2,
-    type=float,
-    metavar="LOW HIGH",
-    help="Least and greatest displacement of every tendon.",
-)
+@own.BOUNDS
 @_CURVE
 @own.target_option
 @own.json_option
@@ -123,7 +128,7 @@ def routing(
     robot: Path,
     target: Path,
     holes: int,
-    bounds: tuple[float, float] | None,
+    bounds: list[float] | None,
     curve: bool,
     unit: str | None,
     json_file: str | None,

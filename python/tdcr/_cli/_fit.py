@@ -9,6 +9,7 @@ import click
 
 from tdcr import InvalidInput, Robot, read_measurements
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command
 
 __all__ = ["fit"]
 
@@ -22,11 +23,14 @@ def _names(
 
 @click.command(
     "fit",
-    epilog="\b\nExample:\n  tdcr fit trunk.toml measured.csv --unit mm --pull-sign positive "
-    "--parameters gain,base --output fitted.toml",
+    cls=Command,
+    epilog=own.examples(
+        "fit finger.toml bench.csv --unit mm --pull-sign positive --parameters gain "
+        "--output fitted.toml"
+    ),
 )
 @own.ROBOT
-@click.argument("measurements", type=click.Path(path_type=Path))
+@click.argument("measurements", type=own.FILE)
 @click.option(
     "--unit",
     type=click.Choice(["m", "cm", "mm", "um", "in"]),
@@ -63,7 +67,7 @@ def _names(
     "--free-from",
     type=float,
     metavar="LENGTH",
-    help="Tendons released by this much or more are slack.",
+    help="Tendons released by this much or more, in --unit, are slack.",
 )
 @own.model_option("rod", "constant_curvature")
 @click.option(
@@ -88,6 +92,7 @@ def fit(
     each row. Gains and offsets are not part of a robot: they are in the table and the JSON alone.
     """
     from tdcr import _report_results as report
+    from tdcr._plot import save_figure
     from tdcr.design import fit as solve
 
     own.checked_picture(plot_file)
@@ -109,6 +114,12 @@ def fit(
             f"got {', '.join(columns)}; name them with --displacement-columns",
             "displacements",
         )
+    slack = not (measured.displacements < 0.0).any()
+    if slack and options["model"] == "rod" and "offset" not in parameters:
+        # Slack tendons tell nothing: the parameters would stay what they were.
+        other = {"positive": "negative", "negative": "positive"}[options["pull_sign"]]
+        message = f"{measurements}: expected a pull, got releases alone: try --pull-sign {other}"
+        raise InvalidInput(message, "pull_sign")
     found = solve(
         arm,
         measured,
@@ -118,12 +129,11 @@ def fit(
         seed=options["seed"],
     )
     shown = "m" if unit == "m" else "mm"
-    own.printed(
-        json_file,
-        lambda: report.fit_json(found),
+    own.delivered(
+        lambda: report.fit_json(found, measured),
         lambda: report.print_fit(found, measured, shown),
+        json_file,
+        (output, found.robot.save),
+        (plot_file, lambda path: save_figure(found.plot().figure, path)),
     )
-    own.written(output, found.robot.save)
-    if plot_file is not None:
-        found.plot().figure.savefig(plot_file, dpi=160, bbox_inches="tight")
     return own.said(found.ok, arm.name, found.status, found.message)

@@ -10,53 +10,57 @@ import click
 import tdcr
 from tdcr import InvalidInput, Robot
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command, Numbers
+from tdcr._cli._obstacles import obstacles_option, read_obstacles
 
 __all__ = ["inverse", "track"]
-
-_BOUNDS = click.option(
-    "--bounds",
-    nargs=2,
-    type=float,
-    metavar="LOW HIGH",
-    help="Least and greatest displacement of every tendon.",
-)
 
 
 @click.command(
     "inverse",
-    epilog="\b\nExamples:\n  tdcr inverse trunk.toml --position 60 20 150 --unit mm\n"
-    "  tdcr inverse trunk.toml --position 0.06 0.02 0.15 --rotation 0 40 0 "
-    "--model constant_curvature",
+    cls=Command,
+    epilog=own.examples(
+        "inverse trunk.toml --position 60 20 170 --unit mm",
+        "inverse trunk.toml --position 0 0 0.2 --rotation 0 0 0 --model constant_curvature",
+    ),
 )
 @own.ROBOT
-@click.option("--position", nargs=3, type=float, metavar="X Y Z", help="Where the tool should be.")
+@click.option(
+    "--position",
+    cls=Numbers,
+    count=3,
+    metavar="X Y Z",
+    help="Where the tool should be, in --unit, in the world frame.",
+)
 @click.option(
     "--rotation",
-    nargs=3,
-    type=float,
+    cls=Numbers,
+    count=3,
     metavar="RX RY RZ",
     help="Rotation vector of the tool in degrees, with --position: how it should be turned.",
 )
 @click.option(
     "--pose",
-    type=click.Path(path_type=Path),
+    type=own.FILE,
     metavar="FILE",
     help="Instead: the 4x4 frame of the tool by rows, numbers with commas or spaces between them.",
 )
 @own.model_option("rod", "constant_curvature")
-@_BOUNDS
+@own.BOUNDS
 @own.unit_option("the position, the bounds, the last column of a pose")
+@obstacles_option
 @own.json_option
 @own.picture_option
 @own.output_option("the answer", ".npz", ".json")
 def inverse(
     robot: Path,
-    position: tuple[float, float, float] | None,
-    rotation: tuple[float, float, float] | None,
+    position: list[float] | None,
+    rotation: list[float] | None,
     pose: Path | None,
     model: str,
-    bounds: tuple[float, float] | None,
+    bounds: list[float] | None,
     unit: str,
+    obstacles: Path | None,
     json_file: str | None,
     plot_file: str | None,
     output: str | None,
@@ -69,18 +73,26 @@ def inverse(
     own.checked_picture(plot_file)
     arm = Robot.load(robot)
     target = _pose(pose, unit) if pose is not None else _target(position, rotation, unit)
-    answer = tdcr.inverse(arm, target, model=model, bounds=_bounds(bounds, unit))
-    own.printed(
-        json_file, lambda: report.as_json(answer), lambda: report.print_inverse(answer, unit)
+    answer = tdcr.inverse(
+        arm,
+        target,
+        model=model,
+        bounds=_bounds(bounds, unit),
+        obstacles=read_obstacles(obstacles),
     )
-    own.written(output, answer.save)
-    if plot_file is not None:
-        marks = answer.target[None, :3, 3] if answer.target.ndim == 2 else answer.target[None]
-        own.picture(answer.shape, plot_file, marks)
-    return own.said(answer.ok, arm.name, answer.status, answer.message)
+    marks = answer.target[None, :3, 3] if answer.target.ndim == 2 else answer.target[None]
+    own.delivered(
+        lambda: report.inverse_json(answer),
+        lambda: report.print_inverse(answer, unit),
+        json_file,
+        (output, answer.save),
+        (plot_file, lambda path: own.picture_of(answer.shape, marks)(path)),
+    )
+    doubt = own.unit_doubted(unit, answer.error, arm, times=20)
+    return own.said(answer.ok, arm.name, answer.status, answer.message + doubt)
 
 
-def _bounds(bounds: tuple[float, float] | None, unit: str) -> Any:
+def _bounds(bounds: list[float] | None, unit: str) -> Any:
     return None if bounds is None else tuple(own.in_metres(bounds, unit))
 
 
@@ -126,13 +138,15 @@ def _pose(path: Path, unit: str) -> Any:
 
 @click.command(
     "track",
-    epilog="\b\nExample:\n  tdcr track trunk.toml circle.csv --unit mm --output pulls.csv",
+    cls=Command,
+    epilog=own.examples("track trunk.toml path.csv --output pulls.csv"),
 )
 @own.ROBOT
-@click.argument("path", type=click.Path(path_type=Path))
+@click.argument("path", type=own.FILE)
 @own.model_option("rod", "constant_curvature")
-@_BOUNDS
+@own.BOUNDS
 @own.target_option
+@obstacles_option
 @own.json_option
 @own.picture_option
 @own.output_option("the pulls of every row", ".csv", ".npz", ".json", ".parquet")
@@ -140,8 +154,9 @@ def track(
     robot: Path,
     path: Path,
     model: str,
-    bounds: tuple[float, float] | None,
+    bounds: list[float] | None,
     unit: str | None,
+    obstacles: Path | None,
     json_file: str | None,
     plot_file: str | None,
     output: str | None,
@@ -157,10 +172,18 @@ def track(
     arm = Robot.load(robot)
     targets, unit = own.points(path, unit)
     found = tdcr.track(
-        arm, targets, model=model, bounds=_bounds(bounds, unit), progress=own.progress()
+        arm,
+        targets,
+        model=model,
+        bounds=_bounds(bounds, unit),
+        obstacles=read_obstacles(obstacles),
+        progress=own.progress(),
     )
-    own.printed(json_file, lambda: report.as_json(found), lambda: report.print_track(found, unit))
-    own.written(output, found.save)
-    if plot_file is not None:
-        own.picture(found[-1].shape, plot_file, targets)
-    return own.rows_said(found)
+    own.delivered(
+        lambda: report.track_json(found),
+        lambda: report.print_track(found, unit),
+        json_file,
+        (output, found.save),
+        (plot_file, lambda path: own.picture_of(found[-1].shape, targets)(path)),
+    )
+    return own.rows_said(found, own.unit_doubted(unit, float(found.error.max()), arm, times=20))

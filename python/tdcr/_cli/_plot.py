@@ -12,16 +12,20 @@ import numpy as np
 import tdcr
 from tdcr import InvalidInput, Inverse, InverseBatch, Robot, Shape, ShapeBatch, Workspace
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command
 
 __all__ = ["plot"]
 
 
 @click.command(
     "plot",
-    epilog="\b\nExamples:\n  tdcr plot pulled.npz --output pulled.png\n"
-    '  tdcr plot trunk.toml --pull "-20 free free" --unit mm --animate pull.gif',
+    cls=Command,
+    epilog=own.examples(
+        "plot trunk.toml --pull -15 free free free -5 free --unit mm --output pulled.png",
+        "plot trunk.toml --pull -15 free free free -9 free --unit mm --animate pull.gif",
+    ),
 )
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=own.FILE)
 @click.option(
     "-o",
     "--output",
@@ -53,7 +57,9 @@ __all__ = ["plot"]
     show_default=True,
     help="Steps of the animation.",
 )
+@click.pass_context
 def plot(
+    context: click.Context,
     file: Path,
     output: str | None,
     animate: str | None,
@@ -76,10 +82,9 @@ def plot(
     if not isinstance(thing, Robot) and (displacements is not None or animate is not None):
         got = f"{file} with a {type(thing).__name__}"
         raise click.UsageError(f"--pull and --animate: expected a robot file, got {got}")
+    _used(context, thing)
     if isinstance(thing, Workspace):
-        from tdcr._plot_workspace import save_workspace
-
-        save_workspace(thing, str(output), view="3d" if view == "3d" else "section")
+        own.workspace_picture(thing, str(output), "3d" if view == "3d" else "section")
         return 0
     pulls = None if displacements is None else own.in_metres(displacements, unit)
     if animate is not None:
@@ -89,7 +94,26 @@ def plot(
         from tdcr._plot import save_picture
 
         save_picture(shape, output, view=view)
-    return own.said(shape.ok, shape.robot.name, shape.status, shape.message)
+    doubt = own.unit_doubted(unit, own.largest(pulls or ()), shape.robot)
+    return own.said(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
+
+
+def _used(context: click.Context, thing: Any) -> None:
+    """Refuse options that would be without use."""
+    given = {
+        name
+        for name in ("model", "row", "frames", "unit")
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+    }
+    kind = type(thing).__name__
+    if "model" in given and not isinstance(thing, Robot):
+        raise click.UsageError(f"--model: expected a robot file, got a {kind}, which has its own")
+    if "row" in given and not isinstance(thing, (ShapeBatch, InverseBatch)):
+        raise click.UsageError(f"--row: expected a batch or a track, got {kind}")
+    if "unit" in given and context.params["displacements"] is None:
+        raise click.UsageError("--unit: expected --pull too")
+    if "frames" in given and context.params["animate"] is None:
+        raise click.UsageError("--frames: expected --animate FILE too")
 
 
 def _read(file: Path) -> Any:
@@ -117,8 +141,6 @@ def _shape(thing: Any, pulls: list[float] | None, model: str, row: int | None) -
             expected = f"expected a row from 0 to {len(thing) - 1}"
             raise click.UsageError(f"--row: {expected}, got {'none' if row is None else row}")
         thing = thing[row]
-    elif row is not None:
-        raise click.UsageError(f"--row: expected a batch or a track, got {type(thing).__name__}")
     if isinstance(thing, Robot):
         return tdcr.forward(thing, pulls or [inf] * len(thing.tendons), model=model)
     shape: Shape = thing.shape if isinstance(thing, Inverse) else thing

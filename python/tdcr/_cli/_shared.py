@@ -5,65 +5,62 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Callable, Iterable
-from math import inf, isfinite, nan
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from tdcr._cli._click import Numbers
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tdcr import Shape
+    from tdcr import Robot, Shape, Workspace
 
 __all__ = [
+    "BOUNDS",
+    "FILE",
     "ROBOT",
     "checked_picture",
+    "delivered",
     "displacements_option",
+    "examples",
     "in_metres",
     "json_option",
+    "largest",
     "model_option",
-    "numbers",
     "output_option",
-    "picture",
+    "picture_of",
     "picture_option",
     "points",
-    "printed",
     "progress",
     "rows_said",
     "said",
     "target_option",
+    "unit_doubted",
     "unit_option",
+    "workspace_picture",
     "writable",
-    "written",
+    "write_text",
 ]
-
-_WORDS = {"inf": inf, "+inf": inf, "free": inf, "nan": nan}
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-ROBOT: Callable[[Command], Command] = click.argument("robot", type=click.Path(path_type=Path))
+# Reading says what is wrong with a file, in the same words for all.
+FILE = click.Path(path_type=Path, readable=False)
+
+ROBOT: Callable[[Command], Command] = click.argument("robot", type=FILE)
 
 
-def numbers(
-    context: click.Context, parameter: click.Parameter, text: str | None
-) -> list[float] | None:
-    """Read numbers with commas or spaces between them."""
-    if text is None:
-        return None
-    found = []
-    for word in text.replace(",", " ").split():
-        try:
-            number = _WORDS[word.lower()] if word.lower() in _WORDS else float(word)
-        except ValueError:
-            number = -inf
-        if number in (inf, -inf) and word.lower() not in _WORDS:
-            raise click.BadParameter(f"expected finite numbers, inf or free, got {word!r}")
-        found.append(number)
-    return found
+def examples(*commands: str, files: bool = True) -> str:
+    """End of a help: commands that run as they stand, where the files of the examples are."""
+    head = "Example" + "s" * (len(commands) > 1)
+    note = ", in a folder with the files of `tdcr demo --files .`" * files
+    return "\b\n" + "\n".join([f"{head}{note}:", *(f"  tdcr {command}" for command in commands)])
 
 
 def displacements_option(required: bool = True) -> Callable[[Command], Command]:
@@ -73,12 +70,22 @@ def displacements_option(required: bool = True) -> Callable[[Command], Command]:
         "--displacements",
         "--pull",
         "displacements",
-        callback=numbers,
+        cls=Numbers,
+        words=True,
         metavar="NUMBERS",
         required=required,
-        help="Change of length of each tendon, with commas or spaces between them: negative pulls, "
-        "0 holds, inf or free leaves the tendon idle.",
+        help="Change of length of each tendon in --unit, with commas or spaces between them: "
+        "negative pulls, 0 holds, inf or free leaves the tendon idle.",
     )
+
+
+BOUNDS: Callable[[Command], Command] = click.option(
+    "--bounds",
+    cls=Numbers,
+    count=2,
+    metavar="LOW HIGH",
+    help="Least and greatest displacement of every tendon in --unit.",
+)
 
 
 def model_option(*models: str) -> Callable[[Command], Command]:
@@ -115,19 +122,21 @@ def target_option(command: Command) -> Command:
 
 def writable(context: click.Context, parameter: click.Parameter, path: str | None) -> str | None:
     """Refuse a file that cannot be written before a long solve, not after it."""
-    if path in (None, "-"):
+    if path is None or path == "-":
         return path
-    folder, fault = Path(str(path)).parent, 0
-    if Path(str(path)).is_dir():
+    path = str(path)
+    folder, fault = Path(path).parent, 0
+    if Path(path).is_dir():
         fault = errno.EISDIR
     elif not folder.exists():
         fault = errno.ENOENT
     elif not folder.is_dir():
         fault = errno.ENOTDIR
-    elif not os.access(folder, os.W_OK):
+    elif not os.access(path if os.path.exists(path) else folder, os.W_OK):
+        # Also a file that its owner keeps from being written: no new one takes its place.
         fault = errno.EACCES
     if fault:
-        raise OSError(fault, os.strerror(fault), str(path))
+        raise OSError(fault, os.strerror(fault), path)
     return path
 
 
@@ -202,28 +211,82 @@ def checked_picture(path: str | None) -> None:
         check_picture(path)
 
 
-def written(path: str | None, save: Callable[[str], object]) -> None:
-    """Save to a path, if there is one."""
-    if path is not None:
-        save(path)
+def delivered(
+    text: Callable[[], str],
+    table: Callable[[], None],
+    json_file: str | None,
+    *files: tuple[str | None, Callable[[str], object]],
+) -> None:
+    """Write a result to the files that are wanted, then print it: as JSON, or else as a table.
+
+    Files come first: a reader of the table that goes (``| head -1``) does not cost them. Where one
+    cannot be written the result is printed all the same.
+    """
+    try:
+        for path, save in files:
+            if path is not None:
+                save(path)
+        if json_file not in (None, "-"):
+            write_text(str(json_file), text() + "\n")
+    except Exception:
+        printed(text, table, json_file)
+        raise
+    printed(text, table, json_file)
 
 
-def printed(json_file: str | None, text: Callable[[], str], table: Callable[[], None]) -> None:
-    """Write JSON where it is wanted, and print the table unless JSON takes its place."""
+def printed(text: Callable[[], str], table: Callable[[], None], json_file: str | None) -> None:
+    """Print JSON where it takes the place of the table, or else the table."""
     if json_file == "-":
-        click.echo(text())
+        click.echo(text().encode())  # JSON is UTF-8 on any terminal
+    else:
+        table()
+
+
+def write_text(path: str, text: str) -> None:
+    """Write a text file, complete or not at all; a pipe or a device as it is."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        with named(path):
+            Path(path).write_text(text, encoding="utf-8")
         return
-    table()
-    if json_file is not None:
-        Path(json_file).write_text(text() + "\n", encoding="utf-8")
+    from tdcr._replace import replace_file
+
+    with named(path):
+        replace_file(path, lambda stream: stream.write(text.encode()))
 
 
-def picture(shape: Shape, path: str | None, marks: NDArray[Any] | None = None) -> None:
-    """Write the picture of a shape, with places marked."""
-    if path is not None:
+@contextmanager
+def named(path: str) -> Iterator[None]:
+    """Name the file over a fault of the system that does not (a full disk)."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, path) from None
+
+
+def picture_of(shape: Shape, marks: NDArray[Any] | None = None) -> Callable[[str], object]:
+    """Give what writes the picture of a shape, with places marked."""
+
+    def save(path: str) -> None:
         from tdcr._plot import save_picture
 
         save_picture(shape, path, marks=marks)
+
+    return save
+
+
+def workspace_picture(found: Workspace, path: str, view: str) -> None:
+    """Write the picture of a workspace."""
+    from tdcr._plot_workspace import save_workspace
+
+    save_workspace(found, path, view=view)
+
+
+def unit_doubted(unit: str, length: float, robot: Robot, *, times: float = 1.0) -> str:
+    """Say, where a length is so many times the robot's, that it was taken for metres."""
+    own = robot.backbone.total_length
+    if unit != "m" or not length > times * own:
+        return ""
+    return f"; {length:g} m is much for a robot of {own:g} m: add --unit mm if mm are meant"
 
 
 def said(ok: bool, name: str | None, status: str, message: str) -> int:
@@ -236,7 +299,12 @@ def said(ok: bool, name: str | None, status: str, message: str) -> int:
     return 1
 
 
-def rows_said(result: Any) -> int:
+def largest(values: Iterable[float]) -> float:
+    """Give the largest size of what is finite."""
+    return max((abs(value) for value in values if isfinite(value)), default=0.0)
+
+
+def rows_said(result: Any, doubt: str = "") -> int:
     """Exit code of many rows: 1 if any did not converge, and how many did what."""
     from collections import Counter
 
@@ -245,7 +313,7 @@ def rows_said(result: Any) -> int:
     if fine == total:
         return 0
     names = ", ".join(f"{count} {status}" for status, count in counts.most_common())
-    click.echo(f"tdcr: {total - fine} of {total} rows did not converge: {names}", err=True)
+    click.echo(f"tdcr: {total - fine} of {total} rows did not converge: {names}{doubt}", err=True)
     return 1
 
 

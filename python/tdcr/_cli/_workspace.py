@@ -10,6 +10,8 @@ import click
 import tdcr
 from tdcr import Robot
 from tdcr._cli import _shared as own
+from tdcr._cli._click import Command, Numbers, read_numbers
+from tdcr._cli._obstacles import obstacles_option, read_obstacles
 
 __all__ = ["workspace"]
 
@@ -21,8 +23,8 @@ def _ranges(
     found = []
     for word in text.replace(",", " ").split():
         ends = word.split(":")
-        read = own.numbers(context, parameter, " ".join(ends)) or []
-        if not (len(ends) == len(read) == 2 or len(ends) == len(read) == 1):
+        read = read_numbers(" ".join(ends), words=True)
+        if len(ends) != len(read) or len(ends) > 2:
             raise click.BadParameter(f"expected LOW:HIGH, a number or free, got {word!r}")
         found.append((read[0], read[-1]))
     if not found:
@@ -32,17 +34,21 @@ def _ranges(
 
 @click.command(
     "workspace",
-    epilog='\b\nExample:\n  tdcr workspace trunk.toml --ranges "-20:0 -20:0 free" --unit mm '
-    "--samples 20000 --plot reach.png",
+    cls=Command,
+    epilog=own.examples(
+        "workspace trunk.toml --ranges -10:0 free free free -6:0 free --unit mm "
+        "--samples 2000 --sampling random --output cloud.npz"
+    ),
 )
 @own.ROBOT
 @click.option(
     "--ranges",
+    cls=Numbers,
     callback=_ranges,
     required=True,
     metavar="RANGES",
-    help="Of each tendon LOW:HIGH, a number that keeps it there, or free; with commas or spaces "
-    "between them. A single one is for all tendons.",
+    help="Of each tendon LOW:HIGH in --unit, a number that keeps it there, or free; with commas or "
+    "spaces between them. A single one is for all tendons.",
 )
 @click.option("--samples", type=int, default=10_000, show_default=True, help="Rows to solve.")
 @click.option(
@@ -55,6 +61,7 @@ def _ranges(
 @click.option("--seed", type=int, default=0, show_default=True, help="Of sobol and random.")
 @own.model_option("rod", "linkage", "constant_curvature")
 @own.unit_option("the ranges")
+@obstacles_option
 @own.json_option
 @own.picture_option
 @click.option(
@@ -73,6 +80,7 @@ def workspace(
     seed: int,
     model: str,
     unit: str,
+    obstacles: Path | None,
     json_file: str | None,
     plot_file: str | None,
     view: str,
@@ -95,16 +103,17 @@ def workspace(
         sampling=sampling,  # type: ignore[arg-type]
         seed=seed,
         model=model,
+        obstacles=read_obstacles(obstacles),
         progress=own.progress(),
     )
-    own.printed(
-        json_file,
+    nothing = plot_file is not None and not found.ok.any()
+    own.delivered(
         lambda: report.workspace_json(found),
         lambda: report.print_workspace(found, unit),
+        json_file,
+        (output, found.save),
+        (None if nothing else plot_file, lambda path: own.workspace_picture(found, path, view)),
     )
-    own.written(output, found.save)
-    if plot_file is not None:
-        from tdcr._plot_workspace import save_workspace
-
-        save_workspace(found, plot_file, view=view)
-    return own.rows_said(found)
+    longest = own.largest(end for pair in limits for end in pair)
+    doubt = own.unit_doubted(unit, longest, arm)
+    return own.rows_said(found, "; no picture" * nothing + doubt)
