@@ -116,7 +116,8 @@ def workspace(
     count, size = _whole("samples", samples, 1), _whole("chunk", chunk, 1)
     obstacles = several_obstacles(obstacles)
     names = _names(fields)
-    rows = _rows(limits, count, kind, _whole("seed", seed, 0))
+    seed = _whole("seed", seed, 0)
+    rows = _rows(limits, count, kind, seed)
     threads = 1 if executor is not None and threads is None else threads
     solver = Solver(robot, model, settings, obstacles, loads, names, threads)
     # No row: settings, model and fields are checked before anything is solved or sent.

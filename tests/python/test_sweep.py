@@ -71,6 +71,13 @@ def test_a_table_is_that_of_a_batch_with_a_row_group_per_chunk(robot, pulls, mod
         np.testing.assert_array_equal(swept[name].to_numpy(), whole[name].to_numpy())
     found = parquet.ParquetFile(tmp_path / "sweep.parquet").metadata
     assert [found.row_group(i).num_rows for i in range(found.num_row_groups)] == [300] * 3 + [100]
+    # In the middle of a column's last numbers: pages carry checksums.
+    column = found.row_group(0).column(2)
+    raw = bytearray((tmp_path / "sweep.parquet").read_bytes())
+    raw[column.data_page_offset + column.total_compressed_size - 9] ^= 1
+    (tmp_path / "sweep.parquet").write_bytes(raw)
+    with pytest.raises(OSError, match=r"(?i)crc"):
+        parquet.read_table(tmp_path / "sweep.parquet", page_checksum_verification=True)
 
 
 def blocks(pulls):
