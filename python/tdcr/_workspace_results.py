@@ -13,7 +13,7 @@ import numpy as np
 from tdcr import _core
 from tdcr._dexterity import manipulability
 from tdcr._status import Status
-from tdcr._value import Value
+from tdcr._value import Value, rebuilt
 from tdcr._voxels import Grid, Volume, VoxelMap, default_voxel, solid_angles, volume
 from tdcr.errors import InvalidInput
 
@@ -45,6 +45,10 @@ class Reach(NamedTuple):
     """Least x, y, z, (3,), world frame [m]."""
     high: Floats
     """Greatest x, y, z, (3,) [m]."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy with arrays that stay read-only."""
+        return rebuilt, (type(self), *self)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
