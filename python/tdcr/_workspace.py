@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from tdcr import _core
-from tdcr._arguments import several_obstacles
+from tdcr._arguments import several_obstacles, whole
 from tdcr._chunks import Solver, spread
 from tdcr._progress import told
 from tdcr._workspace_results import Sampling, Workspace
@@ -101,6 +100,9 @@ def workspace(
         "sobol" without scipy.
     Exception
         Whatever a `SignedDistance` raises, or the executor a third time for the same chunk.
+    KeyboardInterrupt
+        On Ctrl-C, as `forward_batch`. Chunks that an executor's workers have in work go on there:
+        leaving its ``with`` waits for them, the less the smaller they are.
 
     Examples
     --------
@@ -113,12 +115,11 @@ def workspace(
     """
     kind = _kind(sampling)
     limits = _limits(ranges, len(robot.tendons))
-    count, size = _whole("samples", samples, 1), _whole("chunk", chunk, 1)
+    count, size = whole("samples", samples, 1), whole("chunk", chunk, 1)
     obstacles = several_obstacles(obstacles)
     names = _names(fields)
-    seed = _whole("seed", seed, 0)
+    seed = whole("seed", seed, 0)
     rows = _rows(limits, count, kind, seed)
-    threads = 1 if executor is not None and threads is None else threads
     solver = Solver(robot, model, settings, obstacles, loads, names, threads)
     # No row: settings, model and fields are checked before anything is solved or sent.
     columns = {
@@ -144,19 +145,6 @@ def workspace(
         robot, limits, rows, tips, directions, codes, columns,
         model, settings, obstacles, loads, kind, seed,
     )  # fmt: skip
-
-
-def _whole(argument: str, value: object, least: int) -> int:
-    if isinstance(value, bool):
-        raise TypeError(f"{argument}: expected a whole number, got bool")
-    try:
-        number = operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        kind = type(value).__name__
-        raise TypeError(f"{argument}: expected a whole number, got {kind}") from None
-    if number < least:
-        raise InvalidInput(f"{argument}: expected at least {least}, got {number}", argument)
-    return number
 
 
 def _kind(sampling: str) -> Literal["sobol", "grid", "random"]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from tdcr import _core
+from tdcr._arguments import whole
 from tdcr._dexterity import manipulability
 from tdcr._status import Status
 from tdcr._value import Value, rebuilt
@@ -191,8 +192,7 @@ class Workspace(Value):
         combining concentric tube mechanisms and cable-driven mechanisms", IEEE Robotics and
         Automation Letters 2(2), 2017.
         """
-        if bands < 3:
-            raise InvalidInput(f"bands: expected at least 3, got {bands}", "bands")
+        bands = whole("bands", bands, 3)
         points = self._points()
         grid = Grid.of(points, self._voxel(voxel, points))
         return solid_angles(grid, self.directions[self.ok], bands)
@@ -230,8 +230,7 @@ class Workspace(Value):
             what = "loads" if self.loads is not None else "obstacles"
             message = f"{what}: expected none for the Jacobian, got some"
             raise InvalidInput(message, what)
-        if rows < 1:
-            raise InvalidInput(f"rows: expected at least 1, got {rows}", "rows")
+        rows = whole("rows", rows, 1)
         self._points()
         converged = np.flatnonzero(self.ok)
         step = -(-len(converged) // rows)
