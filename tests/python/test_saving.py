@@ -12,6 +12,11 @@ from saved_results import RESULTS, SHAPES, arm, batch, workspace
 import tdcr
 from tdcr._core import _shape
 
+try:
+    import resource
+except ImportError:  # Not on Windows.
+    resource = None
+
 # Lists in lists, deeper than Python calls itself.
 DEEP: list[object] = []
 for _ in range(400):
@@ -259,6 +264,47 @@ def test_a_robot_file_is_known(tmp_path):
     arm().save(tmp_path / "r.json")
     with pytest.raises(tdcr.InvalidInput, match=r"got a robot file, which tdcr\.Robot\.load reads"):
         tdcr.Shape.load(tmp_path / "r.json")
+
+
+def test_a_robot_file_is_told_from_results(tmp_path):
+    path = tmp_path / "s.json"
+    SHAPES["rod"]().save(path)
+    with pytest.raises(tdcr.InvalidInput) as error:
+        tdcr.Robot.load(path)
+    got = "a Shape, which tdcr.Shape.load reads: its .robot is the robot"
+    assert str(error.value) == f"{path}: kind: expected a robot file, got {got}"
+    assert error.value.argument == "kind"
+
+
+@pytest.mark.skipif(resource is None, reason="needs limits of processes")
+@pytest.mark.parametrize("suffix", [".npz", ".json", ".csv", ".parquet"])
+@pytest.mark.parametrize("older", [False, True])
+def test_a_full_disk_leaves_no_half_of_a_file(suffix, older, tmp_path):
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    path = tmp_path / f"w{suffix}"
+    if older:
+        path.write_bytes(b"older")
+    cloud = workspace(fields=("frames",))
+    # Files beyond a limit fail as on a full disk: when they are written, or when they are closed.
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (700, limits[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            cloud.save(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [(path.name, b"older")] * older
+
+
+def test_a_folder_in_the_way_is_named(tmp_path):
+    path = tmp_path / "s.npz"
+    path.mkdir()
+    with pytest.raises(IsADirectoryError) as error:
+        SHAPES["rod"]().save(path)
+    assert error.value.filename == str(path)
+    assert error.value.filename2 is None
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_other_npz_files_are_told_from_ours(tmp_path):
