@@ -79,9 +79,9 @@ def sweep(
     robot : Robot
     displacements : array_like, iterable or callable
         An array (B, K) [m], as for `forward_batch`; what is on disk, as a `numpy.memmap`, is read
-        chunk by chunk. Or an iterator, as a generator is, over blocks (b, K) of any lengths. Or a
-        function that is called with the number of rows that were taken and of those that are
-        wanted next, and returns a block (b, K), one of no rows at the end.
+        chunk by chunk. Or an iterator, as a generator is, or a list of arrays: blocks (b, K) of any
+        lengths. Or a function that is called with the number of rows that were taken and of those
+        that are wanted next, and returns a block (b, K), one of no rows at the end.
     path : str or os.PathLike
         Replaced if it exists. Ending in .npz: all of the fields, as `ShapeBatch.save` writes them
         and `ShapeBatch.load` reads them. The length of its arrays is known at the end alone, so
@@ -172,7 +172,8 @@ def _blocks(displacements: Any, tendons: int, size: int) -> tuple[Iterator[Array
     if callable(displacements):
         return _called(displacements, tendons, size), None
     if isinstance(displacements, Sequence):
-        displacements = numbers("displacements", displacements)
+        blocks = len(displacements) and getattr(displacements[0], "ndim", 0) == 2
+        displacements = iter(displacements) if blocks else numbers("displacements", displacements)
     if hasattr(displacements, "shape"):
         if len(displacements.shape) != 2 or displacements.shape[1] != tendons:
             _refuse("displacements", tendons, displacements.shape)

@@ -11,6 +11,11 @@ from interrupts import assert_interrupts
 import tdcr
 from tdcr import InvalidInput, ShapeBatch, Status
 
+try:
+    import resource
+except ImportError:  # Not on Windows.
+    resource = None
+
 ROWS = 1000
 BALL = tdcr.Sphere((0.05, 0.0, 0.12), 0.02)
 ALL = ("tip", "frames", "positions", "strains", "tendon_points", "tendon_lengths", "tensions",
@@ -94,6 +99,7 @@ def blocks(pulls):
         blocks,
         np.ndarray.tolist,
         lambda pulls: iter([pulls.tolist()]),
+        lambda pulls: [pulls[:300], pulls[300:]],
         lambda pulls: lambda first, count: pulls[first : first + count],
         lambda pulls: lambda first, count: pulls[first : first + count // 2],
         np.asfortranarray,
@@ -248,6 +254,25 @@ def test_what_was_done_is_a_value(robot, tmp_path):
     assert hash(done) == hash(tdcr.Sweep(done.path, 3, {}, done.seconds))
     with pytest.raises(AttributeError):
         done.rows = 4
+
+
+@pytest.mark.skipif(resource is None, reason="needs limits of processes")
+@pytest.mark.parametrize("ending", ["npz", "parquet"])
+@pytest.mark.parametrize("chunk", [50, 100_000])
+def test_a_full_disk_leaves_no_half_of_a_file(robot, pulls, chunk, ending, tmp_path):
+    """On the way, or when all is put together at the end: the older file stays."""
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    path = tmp_path / f"s.{ending}"
+    path.write_bytes(b"older")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            tdcr.sweep(robot, pulls, path, model="constant_curvature", chunk=chunk)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [(path.name, b"older")]
 
 
 @pytest.mark.parametrize("ending", ["npz", "parquet"])
