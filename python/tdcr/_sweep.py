@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import numpy as np
 
-from tdcr._arguments import numbers, several_obstacles, whole
+from tdcr._arguments import numbers, several_obstacles, tendons_of, whole
 from tdcr._batch import ShapeBatch, forward_batch
 from tdcr._progress import told
 from tdcr._replace import replace_file
@@ -143,7 +143,7 @@ def sweep(
             fields=fields, threads=threads, progress=tell or False,
         )  # fmt: skip
 
-    tendons = len(robot.tendons)
+    tendons = tendons_of(robot)
     # No row: everything but the displacements is checked before a file is begun.
     blank = solve(np.empty((0, tendons)))
     columns = writer(path, blank)

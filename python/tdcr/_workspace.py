@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from tdcr import _core
-from tdcr._arguments import several_obstacles, whole
+from tdcr._arguments import numbers, several_obstacles, tendons_of, whole
 from tdcr._chunks import Solver, spread
 from tdcr._progress import told
 from tdcr._workspace_results import Sampling, Workspace
@@ -114,7 +114,7 @@ def workspace(
     ((121, 3), 0.2)
     """
     kind = _kind(sampling)
-    limits = _limits(ranges, len(robot.tendons))
+    limits = _limits(ranges, tendons_of(robot))
     count, size = whole("samples", samples, 1), whole("chunk", chunk, 1)
     obstacles = several_obstacles(obstacles)
     names = _names(fields)
@@ -165,11 +165,7 @@ def _names(fields: Sequence[str]) -> tuple[str, ...]:
 
 def _limits(ranges: ArrayLike, tendons: int) -> NDArray[np.float64]:
     """Ranges as an array of their own, or say what is wrong with them."""
-    try:
-        limits = np.array(ranges, np.float64)
-    except ValueError as error:
-        message = f"ranges: expected an array of shape ({tendons}, 2), got {error}"
-        raise InvalidInput(message, "ranges") from None
+    limits = numbers("ranges", ranges)
     if limits.shape != (tendons, 2):
         expected = f"shape ({tendons}, 2), least and greatest displacement of each tendon"
         raise InvalidInput(f"ranges: expected {expected}, got {limits.shape}", "ranges")

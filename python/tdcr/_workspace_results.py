@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from dataclasses import dataclass
 from numbers import Real
@@ -339,6 +338,8 @@ class Workspace(Value):
             return default_voxel(points)
         if not isinstance(voxel, Real) or isinstance(voxel, bool):
             raise TypeError(f"voxel: expected a number [m], got {type(voxel).__name__}")
-        if not (math.isfinite(voxel) and voxel > 0):
-            raise InvalidInput(f"voxel: expected a positive finite edge [m], got {voxel}", "voxel")
+        # Volumes beyond overflow, and so do counts of voxels.
+        if not 1e-100 <= voxel <= 1e100:
+            expected = "a positive finite edge, from 1e-100 to 1e100 [m]"
+            raise InvalidInput(f"voxel: expected {expected}, got {voxel}", "voxel")
         return float(voxel)

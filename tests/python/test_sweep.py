@@ -218,6 +218,7 @@ def test_what_fails_on_the_way_leaves_no_file(
         ({"progress": 3}, TypeError, "progress: "),
         ({"obstacles": tdcr.SignedDistance(lambda p: 1.0)}, InvalidInput, "SignedDistance"),
         ({"displacements": 3}, TypeError, "displacements: expected an array, an iterator"),
+        ({"robot": "arm.toml"}, TypeError, "robot: expected a Robot, got str"),
         ({"displacements": [0.0] * 6}, InvalidInput, r"displacements: expected shape \(B, 6\)"),
         ({"displacements": np.zeros((4, 5))}, InvalidInput, r"got shape \(4, 5\)"),
         ({"displacements": [[0.0], [0.0, 1.0]]}, InvalidInput, "displacements: expected a rect"),
@@ -231,7 +232,7 @@ def test_misuse_is_refused_before_a_row_is_solved(robot, keywords, error, text, 
     given = {"displacements": np.zeros((3, 6)), "progress": solved.append, **keywords}
     path = tmp_path / given.pop("path", "s.npz")
     with pytest.raises(error, match=text):
-        tdcr.sweep(robot, given.pop("displacements"), path, **given)
+        tdcr.sweep(given.pop("robot", robot), given.pop("displacements"), path, **given)
     assert solved == []
     assert os.listdir(tmp_path) == ["folder.npz"]
 

@@ -263,6 +263,9 @@ def test_pictures_show_what_is_asked():
         ("settings", "for model", lambda: sample(settings=tdcr.RodSettings())),
         ("model", 'got "rods"', lambda: sample(model="rods")),
         ("voxel", "got 0", lambda: sample().volume(0)),
+        ("voxel", "got 1e+300", lambda: sample().volume(1e300)),
+        ("voxel", "got 5e-324", lambda: sample().dexterity(5e-324)),
+        ("voxel", "got nan", lambda: sample().volume(math.nan)),
         ("voxel", "fewer than 2^60", lambda: sample().volume(1e-12)),
         ("bands", "3 or more", lambda: sample().dexterity(bands=2)),
         ("rows", "1 or more", lambda: sample().manipulability(rows=0)),
@@ -281,11 +284,14 @@ def test_wrong_types_are_type_errors():
         lambda: sample(10.5),
         lambda: sample(seed="one"),
         lambda: sample(chunk=True),
+        lambda: tdcr.workspace(3, RANGES, 9),
+        lambda: tdcr.workspace(ROBOT, np.array(RANGES) * 1j, 9),
+        lambda: tdcr.workspace(ROBOT, "wide", 9),
         lambda: sample().dexterity(bands=3.5),
         lambda: sample().manipulability(rows="all"),
         lambda: sample().volume("small"),
     ):
-        with pytest.raises(TypeError, match="expected a"):
+        with pytest.raises(TypeError, match=r"expected (a|numbers)"):
             call()
 
 
