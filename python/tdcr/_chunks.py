@@ -121,6 +121,10 @@ class _Workers:
             columns = self.here.attempt(piece.displacements)
         if isinstance(columns, Exception):
             raise columns
+        if not isinstance(columns, dict):
+            # Else these rows would be whatever was in memory.
+            got = type(columns).__name__
+            raise TypeError(f"executor: expected futures of what tasks return, got {got}")
         return columns
 
 

@@ -191,6 +191,18 @@ def test_an_error_on_the_way_cancels_what_waits(error):
         assert sum(future.cancelled() for future in executor.futures) > 32
 
 
+class Forgetting(ThreadPoolExecutor):
+    """Loses what its tasks return."""
+
+    def submit(self, function, /, *args):
+        return super().submit(lambda: None)
+
+
+def test_lost_answers_are_no_rows():
+    with Forgetting(1) as executor, pytest.raises(TypeError, match=r"executor: .* got NoneType"):
+        sample(executor=executor)
+
+
 def test_what_is_no_executor_is_said():
     with pytest.raises(TypeError, match=r"executor: expected a concurrent\.futures\.Executor or"):
         sample(executor=3)

@@ -307,6 +307,14 @@ def test_a_folder_in_the_way_is_named(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_name_too_long_is_the_one_given(tmp_path):
+    path = tmp_path / ("s" * 250 + ".npz")  # As long as names may be; that beside it is longer.
+    with pytest.raises(OSError, match="too long") as error:
+        SHAPES["rod"]().save(path)
+    assert error.value.filename == str(path)
+    assert not list(tmp_path.iterdir())
+
+
 def test_other_npz_files_are_told_from_ours(tmp_path):
     np.savez(tmp_path / "a.npz", x=np.arange(3))
     with pytest.raises(tdcr.InvalidInput, match=r"header: expected the text .* got members x"):
