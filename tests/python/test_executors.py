@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 from concurrent.futures import (
     BrokenExecutor,
     Executor,
@@ -106,14 +107,26 @@ def test_errors_of_a_solve_are_not_tried_again():
     assert len(calls) == 1
 
 
-def test_a_dask_cluster_gives_the_same_rows():
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
+def test_a_dask_cluster_gives_the_same_rows_when_a_worker_is_killed_too():
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
         found = sample(chunk=100, executor=client.get_executor())
+        left = list(client.run(os.getpid).values())[:1]
+
+        def kill(done):
+            if left and done >= 300:
+                os.kill(left.pop(), signal.SIGKILL)
+
+        killed = sample(chunk=100, executor=client.get_executor(), progress=kill)
+        # A cluster that is closed while it replaces a worker waits for half a minute.
+        client.wait_for_workers(2, timeout=60)
+    assert left == []
     assert same_rows(found, sample())
+    assert same_rows(killed, sample())
 
 
 class Cancelling(ThreadPoolExecutor):
