@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from tdcr._core import Obstacle
+from tdcr._core import Obstacle, Robot
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["index", "number", "numbers", "several_obstacles", "vector", "whole"]
+__all__ = ["index", "number", "numbers", "several_obstacles", "tendons_of", "vector", "whole"]
 
 
 def several_obstacles(obstacles: Any) -> tuple[Any, ...]:
@@ -32,6 +32,13 @@ def several_obstacles(obstacles: Any) -> tuple[Any, ...]:
         got = type(obstacles).__name__
         raise TypeError(f"obstacles: expected an obstacle or a sequence of obstacles, got {got}")
     return tuple(obstacles)
+
+
+def tendons_of(robot: Any) -> int:
+    """Count the tendons of a robot; what is none is a TypeError."""
+    if not isinstance(robot, Robot):
+        raise TypeError(f"robot: expected a Robot, got {type(robot).__name__}")
+    return len(robot.tendons)
 
 
 def whole(name: str, value: Any, least: int | None = None) -> int:

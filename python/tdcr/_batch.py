@@ -10,7 +10,7 @@ import numpy as np
 from tdcr import _core
 from tdcr._arguments import several_obstacles
 from tdcr._progress import told
-from tdcr._value import same
+from tdcr._value import Value, same
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -124,6 +124,9 @@ class ShapeBatch(Sequence["Shape"]):
     obstacles: tuple[Obstacle, ...]
     loads: Loads | None
     _columns: dict[str, Any]
+
+    # From a pickle or a copy, with arrays that stay read-only.
+    __setstate__ = Value.__setstate__
 
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse: a result does not change."""

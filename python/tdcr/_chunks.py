@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,7 +77,9 @@ class _Workers:
     """An executor, and which of its futures solves which piece."""
 
     def __init__(self, executor: Executor, solver: Solver) -> None:
-        self.executor, self.solver = executor, solver
+        self.executor, self.here = executor, solver
+        # Of a machine's cores every worker has one; what is left to this process has all.
+        self.away = replace(solver, threads=solver.threads or 1)
         self.running: dict[Future[Any], _Piece] = {}
         self.broken = False
 
@@ -85,7 +87,7 @@ class _Workers:
         """Give a piece to the workers, if there are any left."""
         if not self.broken:
             try:
-                future = self.executor.submit(self.solver.attempt, piece.displacements)
+                future = self.executor.submit(self.away.attempt, piece.displacements)
             except BrokenExecutor as error:
                 self.lose(error)
             else:
@@ -109,16 +111,20 @@ class _Workers:
             columns = future.result()
         except BrokenExecutor as error:
             self.lose(error)
-            columns = self.solver.attempt(piece.displacements)
+            columns = self.here.attempt(piece.displacements)
         except Exception:
             if piece.tries == _TRIES:
                 raise
             again = _Piece(piece.start, piece.displacements, piece.tries + 1)
             if self.submit(again):
                 return None
-            columns = self.solver.attempt(piece.displacements)
+            columns = self.here.attempt(piece.displacements)
         if isinstance(columns, Exception):
             raise columns
+        if not isinstance(columns, dict):
+            # Else these rows would be whatever was in memory.
+            got = type(columns).__name__
+            raise TypeError(f"executor: expected futures of what tasks return, got {got}")
         return columns
 
 
@@ -132,7 +138,15 @@ def spread(
     """Solve all rows in pieces of `chunk` rows and hand over each with its first row.
 
     Pieces come in any order, each once. Errors of a solve are raised as they are.
+
+    Raises
+    ------
+    TypeError
+        What is no executor.
     """
+    if not (executor is None or callable(getattr(executor, "submit", None))):
+        got = type(executor).__name__
+        raise TypeError(f"executor: expected a concurrent.futures.Executor or None, got {got}")
     starts = range(0, len(displacements), chunk)
     pieces = (_Piece(start, displacements[start : start + chunk]) for start in starts)
     if executor is None:
@@ -156,7 +170,7 @@ def _spread(
     while True:
         while len(workers.running) < _WINDOW and (piece := next(waiting, None)) is not None:
             if not workers.submit(piece):
-                keep(piece.start, workers.solver(piece.displacements))
+                keep(piece.start, workers.here(piece.displacements))
         if not workers.running:
             return
         # The timeout lets Ctrl-C through where a wait without one does not.

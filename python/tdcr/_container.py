@@ -138,13 +138,13 @@ def _checked(path: StrPath, data: Any) -> dict[str, Any]:
         raise InvalidInput(f"{expected}; got a robot file, which tdcr.Robot.load reads", "path")
     if "kind" not in data or "format" not in data:
         raise InvalidInput(f"{expected}; got a file without 'format' and 'kind'", "path")
-    version = data["format"]
-    if version != FORMAT or isinstance(version, bool):
-        newer = isinstance(version, int) and not isinstance(version, bool) and version > FORMAT
+    version, kind = data["format"], data["kind"]
+    if type(version) is not int or version != FORMAT:
+        newer = type(version) is int and version > FORMAT
         hint = f" (tdcr {data.get('tdcr', 'of a later version')} wrote it)" if newer else ""
         raise InvalidInput(f"{shown}: format: expected {FORMAT}, got {version!r}{hint}", "format")
-    if data["kind"] not in KINDS:
-        raise InvalidInput(f"{expected}; got the kind {data['kind']!r}", "kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InvalidInput(f"{expected}; got the kind {kind!r}"[:500], "kind")
     return data
 
 
@@ -155,13 +155,18 @@ def _read_npz(path: StrPath) -> Any:
             archive = np.load(stream, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise InvalidInput(f"{shown}: not an npz file: it is a single array", "path")
-            arrays = {name: archive[name] for name in archive.files}
+            # Members that are no arrays come as bytes.
+            found = ((name, archive[name]) for name in archive.files)
+            arrays = {name: one for name, one in found if isinstance(one, np.ndarray)}
         except _DAMAGE as error:
             if isinstance(error, InvalidInput):
                 raise
             fault = " ".join(str(error).split()) or type(error).__name__
-            # numpy takes what it does not know for a pickle, and advises to trust it.
-            fault = "no archive" if "If you trust" in fault else fault
+            # numpy takes what it does not know for a pickle, and goes on to say how to run it.
+            if "Object arrays" in fault:
+                fault = "it holds pickled objects, which are not read"
+            elif "pickle" in fault:
+                fault = "no archive"
             message = f"{shown}: not an npz file, or one that is cut off or damaged: {fault}"
             raise InvalidInput(message, "path") from None
     header = arrays.pop("header", None)
@@ -173,15 +178,20 @@ def _read_npz(path: StrPath) -> Any:
         return _given_back(json.loads(str(header)), arrays)
     except KeyError as error:
         raise InvalidInput(f"{shown}: {error.args[0]}: the array is missing", "path") from None
-    except (ValueError, RecursionError) as error:
+    except (json.JSONDecodeError, RecursionError) as error:
         raise InvalidInput(f"{shown}: header: not JSON: {error}", "header") from None
+    except ValueError as error:
+        raise InvalidInput(f"{shown}: header: {error}", "header") from None
 
 
 def _given_back(value: Any, arrays: dict[str, Any]) -> Any:
     """Put arrays where they were."""
     if isinstance(value, dict):
         if value.keys() == {"array"}:
-            return arrays[value["array"]]
+            name = value["array"]
+            if not isinstance(name, str):
+                raise ValueError(f"expected the name of an array, got {name!r}"[:200])
+            return arrays[name]
         return {key: _given_back(one, arrays) for key, one in value.items()}
     if isinstance(value, list):
         return [_given_back(one, arrays) for one in value]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
+from tdcr._value import rebuilt
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -28,6 +29,10 @@ class Manipulability(NamedTuple):
     """Longest over shortest axis of the ellipsoid; infinite where a direction is lost."""
     axes: NDArray[np.float64]
     """Lengths of the ellipsoid's axes, longest first, (3,) or (6,)."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy with arrays that stay read-only."""
+        return rebuilt, (type(self), *self)
 
 
 def manipulability(

@@ -60,7 +60,14 @@ def load_robot(path: StrPath) -> Robot:
         The file cannot be read.
     """
     kind = _kind(path)
-    return robot_of(path, parsed(path, Path(path).read_bytes(), kind))
+    data = parsed(path, Path(path).read_bytes(), kind)
+    if isinstance(data, dict) and isinstance(said := data.get("kind"), str):
+        from tdcr._save_kinds import KINDS
+
+        if said in KINDS:
+            got = f"a {said}, which tdcr.{said}.load reads: its .robot is the robot"
+            raise InvalidInput(f"{os.fspath(path)}: kind: expected a robot file, got {got}", "kind")
+    return robot_of(path, data)
 
 
 def robot_of(path: StrPath, data: Any) -> Robot:

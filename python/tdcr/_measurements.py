@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
@@ -71,10 +72,11 @@ def read_measurements(
 ) -> Measurements:
     """Read measured displacements and positions from a CSV file, for `design.fit`.
 
-    The first line names the columns; between cells is a comma, a semicolon or a tab; lines that
-    start with # are comments. Rows with a blank or NaN in a column that is read are dropped and
-    counted. Columns that are not named are found by their names, in lower case and without a unit
-    at the end (``x [mm]``, ``x (mm)``, ``x_mm``), cut into words at what is no letter or digit:
+    The first line names the columns; between cells is a comma, a semicolon or a tab; decimals have
+    a point. Empty lines are skipped, lines that start with # are comments. Rows with a blank or NaN
+    in a column that is read are dropped and counted. Columns that are not named are found by their
+    names, in lower case and without a unit at the end (``x [mm]``, ``x (mm)``, ``x_mm``), cut into
+    words at what is no letter or digit:
 
     - displacements: the first word is d, dl, displacement, pull or tendon, with or without a
       number, and no word is tension, force, torque, current, x, y or z; in the order of the file;
@@ -85,9 +87,11 @@ def read_measurements(
     ----------
     path : str or os.PathLike
     unit : {"m", "cm", "mm", "um", "in"}
-        Unit of all lengths in the file. Columns whose names say another one are refused.
+        Unit of all lengths in the file. Columns whose names say another one are refused ("µm" is
+        "um").
     pull_sign : {"positive", "negative"}
-        Sign that a pull has in the file. What is read has negative pulls.
+        Sign that a pull has in the file. What is read has negative pulls. A RuntimeWarning tells
+        where there are releases and no pull at all, as with the wrong sign.
     displacements : sequence of str, optional
         Names of the columns with displacements, in the order of the robot's tendons.
     positions : sequence of str, optional
@@ -103,8 +107,9 @@ def read_measurements(
     Raises
     ------
     InvalidInput
-        A unit or sign that is none, or that the columns contradict; columns that are not there or
-        not found; a cell that is no number; no row without gaps. Names path and line.
+        A sign that is none, a unit that is none or that the columns contradict; columns that are
+        not there, not found, or of both; a cell that is no number; no row without gaps. Names path
+        and line.
     TypeError
         A value of another type.
     OSError
@@ -120,6 +125,10 @@ def read_measurements(
     table = read_table(path)
     pulled = _displacements(table, displacements)
     placed = _positions(table, positions)
+    both = [table.names[column] for column in pulled if column in placed]
+    if both:
+        expected = "positions: expected other columns than those of displacements"
+        raise table.fault("positions", f"{expected}, got {both[0]!r} in both")
     table.check_unit([*pulled, *placed], unit)
     rows = table.metres(pulled, unit, free=True)
     # 0 - x, not -x: no negative zeros.
@@ -127,6 +136,7 @@ def read_measurements(
     if free_from is not None:
         rows[rows >= table.scaled(free_from, unit)] = np.inf
     points = table.metres(placed, unit)
+    _check_pulls(table.path, rows, pull_sign)
     full = ~(np.isnan(rows).any(axis=1) | np.isnan(points).any(axis=1))
     if not full.any():
         raise table.fault("path", f"expected a row without gaps, got none in {len(full)}")
@@ -144,6 +154,14 @@ def read_measurements(
         displacement_columns=tuple(table.names[column] for column in pulled),
         position_columns=tuple(table.names[column] for column in placed),
     )
+
+
+def _check_pulls(path: str, rows: NDArray[np.float64], pull_sign: str) -> None:
+    """Warn where tendons are released, but none is ever pulled."""
+    finite = rows[np.isfinite(rows)]
+    if (finite > 0).any() and not (finite < 0).any():
+        message = f"{path}: no row pulls a tendon if pulls are {pull_sign}: is it the other sign?"
+        warnings.warn(message, RuntimeWarning, stacklevel=3)
 
 
 def _displacements(table: Table, names: Sequence[str] | None) -> list[int]:

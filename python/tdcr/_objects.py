@@ -87,8 +87,8 @@ def made(data: Any, kinds: tuple[str, ...]) -> Any:
         Another kind, or arguments that its constructor refuses.
     """
     kind = data.get("type") if isinstance(data, dict) else None
-    if kind not in kinds or kind not in _ARGUMENTS:
-        got = repr(kind) if kind else f"no type in {type(data).__name__}"
+    if not isinstance(kind, str) or kind not in kinds or kind not in _ARGUMENTS:
+        got = repr(kind) if isinstance(kind, str) else f"no type in {type(data).__name__}"
         raise InvalidInput(f"type: expected one of {', '.join(kinds)}, got {got}", "type")
     given = {key: _argument(value) for key, value in data.items() if key != "type"}
     try:

@@ -6,9 +6,10 @@ import csv
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -29,7 +30,9 @@ _METRES = {
     "um": Decimal("1e-6"),
     "in": Decimal("0.0254"),
 }
-_UNIT = re.compile(r"^(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|[ _](m|cm|mm|um))$")
+# With the micro sign or the Greek letter too.
+_UNIT = re.compile(r"^(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|[ _](m|cm|mm|[u\u00b5\u03bc]m))$")
+_MICRO = str.maketrans("\u00b5\u03bc", "uu")
 _AXES = ("x", "y", "z")
 
 
@@ -60,7 +63,8 @@ class Table:
     def unit_of(self, column: int) -> str | None:
         """Read the unit off the end of a column's name: ``x [mm]``, ``x (mm)`` or ``x_mm``."""
         found = _UNIT.match(self.names[column])
-        return found and (found[2] or found[3] or found[4])
+        said = found and (found[2] or found[3] or found[4])
+        return said and said.strip().translate(_MICRO)
 
     def words(self, column: int) -> list[str]:
         """Give the words of a column's name in lower case, without its unit."""
@@ -107,6 +111,8 @@ class Table:
 
 def length_unit(unit: str) -> str:
     """Check the name of a unit."""
+    if not isinstance(unit, str):
+        raise TypeError(f"unit: expected the name of a unit, got {type(unit).__name__}")
     if unit not in _METRES:
         expected = ", ".join(f'"{name}"' for name in _METRES)
         raise InvalidInput(f"unit: expected one of {expected}, got {unit!r}", "unit")
@@ -116,37 +122,32 @@ def length_unit(unit: str) -> str:
 def read_table(path: StrPath) -> Table:
     """Read a CSV file whose first line names the columns.
 
-    Between cells is a comma, a semicolon or a tab, whichever the first line has most of. Lines that
-    start with # and empty lines at the end are no rows.
+    Between cells is a comma, a semicolon or a tab, whichever the first line has most of. Empty
+    lines and those that start with # are no rows. A cell in quotes may go on in the next lines.
 
     Raises
     ------
     InvalidInput
-        No text, or a first line that does not name every column once.
+        No text, a first line that does not name every column once, a quote without its end.
     OSError
         The file cannot be read.
     """
     shown = os.fspath(path)
     try:
-        text = Path(path).read_bytes().decode("utf-8-sig").rstrip()
+        text = Path(path).read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         message = f"{shown}: not a CSV file: byte {error.start} is not UTF-8 text"
         raise InvalidInput(message, "path") from None
-    numbered = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line[:1] != "#"]
+    numbered = list(_records(shown, text))
     if not numbered:
         raise InvalidInput(f"{shown}: expected a line with names of columns, got none", "path")
-    first = numbered[0][1]
-    between = max(",;\t", key=first.count)
-    try:
-        cells = [next(csv.reader([line], delimiter=between), []) for _, line in numbered]
-    except csv.Error as error:
-        raise InvalidInput(f"{shown}: not a CSV file: {error}", "path") from None
-    names = tuple(name.strip() for name in cells[0])
-    table = Table(shown, names, cells[1:], [i for i, _ in numbered[1:]])
+    first, cells = numbered[0]
+    names = tuple(re.sub(r"\s*[\r\n]\s*", " ", name.strip()) for name in cells)
+    table = Table(shown, names, [one for _, one in numbered[1:]], [i for i, _ in numbered[1:]])
     if any(_is_number(name) for name in names):
-        raise table.fault(
-            "path", f"expected names of columns in the first line, got {first[:60]!r}"
-        )
+        hint = "; lines that start with # are comments" if first > 1 else ""
+        expected, got = "expected names of columns in the first line", ",".join(names)[:60]
+        raise table.fault("path", f"{expected}, got {got!r}{hint}")
     twice = [name for name in names if names.count(name) > 1 and name]
     if twice:
         raise table.fault("path", f"expected columns of different names, got {twice[0]!r} twice")
@@ -157,6 +158,24 @@ def read_table(path: StrPath) -> Table:
     if not table.cells:
         raise table.fault("path", "expected rows below the names of columns, got none")
     return table
+
+
+def _records(shown: str, text: str) -> Iterator[tuple[int, list[str]]]:
+    """Cells of every record, with the line it starts on."""
+    # Not str.splitlines, which also ends lines at a form feed, as no editor does.
+    lines = enumerate(re.split(r"\r\n|\r|\n", text), 1)
+    between = ""
+    for number, line in lines:
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        between = between or max(",;\t", key=line.count)
+        # Takes further lines for as long as a quote is open.
+        more = (f"{one}\n" for one in chain([line], (later for _, later in lines)))
+        try:
+            yield number, next(csv.reader(more, delimiter=between, strict=True))
+        except csv.Error as error:
+            message = f"{shown}: line {number}: expected cells as of a CSV file, got {error}"
+            raise InvalidInput(message, "path") from None
 
 
 def _is_number(text: str) -> bool:

@@ -72,16 +72,17 @@ class Record:
 
     def number(self, name: str) -> float:
         value = self.get(name)
-        if value is None or value in ("inf", "-inf"):
+        if value is None or (isinstance(value, str) and value in _WORDS):
             return float(_WORDS[value])
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fault(name, f"expected a number, got {value!r}")
-        return float(value)
+            raise self.fault(name, f"expected a number, got {value!r}"[:200])
+        with self.at(name):
+            return float(value)
 
-    def whole(self, name: str) -> int:
+    def whole(self, name: str, most: float = 2**63 - 1) -> int:
         value = self.get(name)
-        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
-            raise self.fault(name, f"expected a whole number, got {value!r}")
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
+            raise self.fault(name, f"expected a whole number, got {value!r}"[:200])
         return value
 
     def flag(self, name: str) -> bool:

@@ -31,10 +31,17 @@ def replace_file(path: str | os.PathLike[str], write: Callable[[Any], object]) -
     target = Path(os.path.realpath(path))
     beside = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
     if not target.parent.is_dir():
-        # Else the error would name the file beside it.
+        # Else errors would name the file beside it, of which who saves knows nothing.
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(path))
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
     try:
-        with beside.open("xb") as stream:
+        stream = beside.open("xb")
+    except OSError as error:
+        error.filename = os.fspath(path)
+        raise
+    try:
+        with stream:
             write(stream)
         if target.exists():
             shutil.copymode(target, beside)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import fields
 from typing import Any, NamedTuple
@@ -116,11 +117,25 @@ def _count(record: Record, name: str) -> Any:
 
 def _places(record: Record, name: str) -> Any:
     """Positions or frames, or the places of all disks."""
-    value = record.get(name)
-    if not _rows(record) and np.ndim(value) == 2 and len(value[0]) == 3:
+    sizes = _sizes(record.get(name))
+    if not _rows(record) and len(sizes) == 2 and sizes[1] == 3:
         return record.array(name, -1, 3)
-    first = np.ndim(record.get(name)) - len(_rows(record))
-    return record.array(name, *_rows(record), *((4, 4) if first == 2 else (3,)))
+    frames = len(sizes) - len(_rows(record)) == 2
+    if sizes == (0,) and _rows(record):
+        # In JSON no row tells what the others would be.
+        frames = record.flag("frames")
+    return record.array(name, *_rows(record), *((4, 4) if frames else (3,)))
+
+
+def _sizes(value: Any) -> tuple[int, ...]:
+    """Shape of an array, or of lists as the first ones in them tell."""
+    if isinstance(value, np.ndarray):
+        return tuple(value.shape)
+    sizes = []
+    while isinstance(value, list):
+        sizes.append(len(value))
+        value = value[0] if value else None
+    return tuple(sizes)
 
 
 def _shape_within(record: Record, name: str) -> Any:
@@ -144,13 +159,15 @@ def _statuses(record: Record, name: str) -> Any:
 
 
 def _value_said(result: Any) -> dict[str, Any]:
-    said = {}
+    said: dict[str, Any] = {}
     for field in fields(result):
         value = getattr(result, field.name)
         if isinstance(value, _core.Shape):
             said[field.name] = {"kind": "Shape", **_shape_said(value)}
         else:
             said[field.name] = described(value, field.name)
+    if isinstance(result, InverseBatch):
+        said["frames"] = result.targets.ndim == 3
     return said
 
 
@@ -237,7 +254,8 @@ def _contacts(record: Record, value: Any) -> Any:
     else:
         if not isinstance(value, dict) or set(value) != set(names):
             raise record.fault("contacts", f"expected columns {', '.join(names)}")
-        table = np.empty(len(value["row"]), CONTACT)
+        rows = value["row"]
+        table = np.empty(len(rows) if isinstance(rows, list) else 0, CONTACT)
         for name in names:
             own = CONTACT[name]
             sizes = (len(table), *own.shape)
@@ -271,7 +289,7 @@ def _workspace_read(record: Record) -> Workspace:
         obstacles=record.things("obstacles"),
         loads=record.optional("loads", ("Loads",)),
         sampling=record.text("sampling", "sobol", "grid", "random"),  # type: ignore[arg-type]
-        seed=record.whole("seed"),
+        seed=record.whole("seed", math.inf),
     )
 
 

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from tdcr._container import check_header, opened, read_file, write_file
+from tdcr._container import opened, read_file, write_file
 from tdcr._record import Record
 from tdcr._save_kinds import KINDS
 from tdcr._tables import read_parquet, write_csv, write_parquet
@@ -71,7 +71,7 @@ def load(path: StrPath, kind: str) -> Any:
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".parquet" and kind == "Workspace":
-        fields = check_header(path, read_parquet(path), kind)
+        fields = read_parquet(path)
     elif suffix in (".csv", ".parquet"):
         raise InvalidInput(
             f"path: {suffix} files are for other programs and not read back; expected one ending "
@@ -80,12 +80,18 @@ def load(path: StrPath, kind: str) -> Any:
         )
     else:
         fields = read_file(path, kind)
-    return KINDS[kind].read(Record(path, fields))
+    return _read(path, fields)
 
 
 def load_any(path: StrPath) -> Any:
     """Read a result of whatever kind it is."""
     if Path(path).suffix.lower() == ".parquet":
         return load(path, "Workspace")
-    fields = opened(path)
-    return KINDS[fields["kind"]].read(Record(path, fields))
+    return _read(path, opened(path))
+
+
+def _read(path: StrPath, fields: dict[str, Any]) -> Any:
+    try:
+        return KINDS[fields["kind"]].read(Record(path, fields))
+    except RecursionError:
+        raise InvalidInput(f"{os.fspath(path)}: a field is nested too deeply", "path") from None

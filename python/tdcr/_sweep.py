@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import numpy as np
 
-from tdcr._arguments import numbers, several_obstacles, whole
+from tdcr._arguments import numbers, several_obstacles, tendons_of, whole
 from tdcr._batch import ShapeBatch, forward_batch
 from tdcr._progress import told
 from tdcr._replace import replace_file
@@ -79,9 +79,9 @@ def sweep(
     robot : Robot
     displacements : array_like, iterable or callable
         An array (B, K) [m], as for `forward_batch`; what is on disk, as a `numpy.memmap`, is read
-        chunk by chunk. Or an iterator, as a generator is, over blocks (b, K) of any lengths. Or a
-        function that is called with the number of rows that were taken and of those that are
-        wanted next, and returns a block (b, K), one of no rows at the end.
+        chunk by chunk. Or an iterator, as a generator is, or a list of arrays: blocks (b, K) of any
+        lengths. Or a function that is called with the number of rows that were taken and of those
+        that are wanted next, and returns a block (b, K), one of no rows at the end.
     path : str or os.PathLike
         Replaced if it exists. Ending in .npz: all of the fields, as `ShapeBatch.save` writes them
         and `ShapeBatch.load` reads them. The length of its arrays is known at the end alone, so
@@ -143,7 +143,7 @@ def sweep(
             fields=fields, threads=threads, progress=tell or False,
         )  # fmt: skip
 
-    tendons = len(robot.tendons)
+    tendons = tendons_of(robot)
     # No row: everything but the displacements is checked before a file is begun.
     blank = solve(np.empty((0, tendons)))
     columns = writer(path, blank)
@@ -172,7 +172,8 @@ def _blocks(displacements: Any, tendons: int, size: int) -> tuple[Iterator[Array
     if callable(displacements):
         return _called(displacements, tendons, size), None
     if isinstance(displacements, Sequence):
-        displacements = numbers("displacements", displacements)
+        blocks = len(displacements) and getattr(displacements[0], "ndim", 0) == 2
+        displacements = iter(displacements) if blocks else numbers("displacements", displacements)
     if hasattr(displacements, "shape"):
         if len(displacements.shape) != 2 or displacements.shape[1] != tendons:
             _refuse("displacements", tendons, displacements.shape)

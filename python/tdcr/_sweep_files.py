@@ -75,7 +75,8 @@ class _Parquet:
 
     @contextmanager
     def into(self, stream: Any) -> Iterator[Keep]:
-        with self.arrow.parquet.ParquetWriter(stream, self.schema) as writer:
+        sums = {"write_page_checksum": True}
+        with self.arrow.parquet.ParquetWriter(stream, self.schema, **sums) as writer:
             yield lambda start, batch: writer.write_table(
                 self.table(start, batch), row_group_size=len(batch)
             )

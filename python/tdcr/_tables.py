@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import os
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from tdcr._container import header_text
+from tdcr._container import check_header, header_text
 from tdcr._core import Robot, Shape
 from tdcr._objects import described
 from tdcr._replace import replace_file
@@ -124,11 +125,14 @@ def write_parquet(path: StrPath, result: Any) -> None:
         said["values"] = {name: list(column.shape) for name, column in result.values.items()}
         metadata = {"tdcr": header_text("Workspace", said)}
         for name, column in result.values.items():
-            flat = column.reshape(len(column), -1)
-            values = arrow.array(flat.ravel())
-            columns[name] = arrow.FixedSizeListArray.from_arrays(values, flat.shape[1])
+            width = math.prod(column.shape[1:])
+            if width:  # None of a robot without tendons; lists of nothing there are not.
+                values = arrow.array(column.ravel())
+                columns[name] = arrow.FixedSizeListArray.from_arrays(values, width)
     table = arrow.table(columns).replace_schema_metadata(metadata)
-    replace_file(path, lambda stream: arrow.parquet.write_table(table, stream))
+    replace_file(
+        path, lambda stream: arrow.parquet.write_table(table, stream, write_page_checksum=True)
+    )
 
 
 def _fields(workspace: Any) -> list[str]:
@@ -139,40 +143,75 @@ def _fields(workspace: Any) -> list[str]:
 
 def read_parquet(path: StrPath) -> dict[str, Any]:
     """Read the fields of a workspace from the Parquet file that it wrote."""
+    from tdcr._files import robot_of
+    from tdcr._status import Status
+
     shown = os.fspath(path)
     arrow = require_pyarrow()
     with open(path, "rb") as stream:
         try:
-            table = arrow.parquet.read_table(stream)
+            table = arrow.parquet.read_table(stream, page_checksum_verification=True)
         except (arrow.ArrowException, OSError) as error:
             fault = " ".join(str(error).split())
-            raise InvalidInput(f"{shown}: not a Parquet file: {fault}", "path") from None
-    own = (table.schema.metadata or {}).get(b"tdcr")
-    if own is None:
-        message = f"{shown}: expected the Parquet file of a Workspace, got one of something else"
-        raise InvalidInput(message, "path")
-    fields: dict[str, Any] = json.loads(own)
+            message = f"{shown}: not a Parquet file, or one that is cut off or damaged: {fault}"
+            raise InvalidInput(message, "path") from None
+    fields = _workspace_header(path, table)
+
+    def column(name: str) -> Any:
+        if name not in table.column_names:
+            raise InvalidInput(f"{shown}: {name}: the column is missing", name)
+        return table[name].combine_chunks()
 
     def stacked(*names: str) -> Any:
-        for name in names:
-            if name not in table.column_names:
-                raise InvalidInput(f"{shown}: {name}: the column is missing", name)
-        columns = [table[name].to_numpy() for name in names]
+        columns = [column(name).to_numpy(zero_copy_only=False) for name in names]
         return np.column_stack(columns) if columns else np.empty((table.num_rows, 0))
 
-    names = [n for n in table.column_names if n.startswith("displacement ")]
-    from tdcr._status import Status
+    def within(name: str, sizes: Any) -> Any:
+        inner = _inner_sizes(shown, name, sizes)
+        if not math.prod(inner):
+            return np.empty((table.num_rows, *inner))
+        lists = column(name)
+        flat = lists.flatten() if arrow.types.is_fixed_size_list(lists.type) else lists
+        if len(flat) != table.num_rows * math.prod(inner):
+            expected = f"{table.num_rows} lists of {math.prod(inner)} numbers"
+            raise InvalidInput(f"{shown}: {name}: expected {expected}, got {lists.type}", name)
+        return flat.to_numpy(zero_copy_only=False).reshape(table.num_rows, *inner)
 
+    # By name: other programs may have put the columns into another order.
+    tendons = robot_of(f"{shown}: robot", fields.get("robot")).tendon_names
     places = {str(status): code for code, status in enumerate(Status)}
     words = stacked("status")[:, 0].tolist()
     codes = [places.get(word, len(places)) for word in words]
     return fields | {
-        "displacements": stacked(*names),
+        "displacements": stacked(*(f"displacement {name} [m]" for name in tendons)),
         "tips": stacked(*(f"tip {axis} [m]" for axis in _AXES)),
         "directions": stacked(*(f"direction {axis}" for axis in _AXES)),
         "codes": np.array(codes, np.uint8),
-        "values": {
-            name: table[name].combine_chunks().flatten().to_numpy().reshape(shape)
-            for name, shape in fields["values"].items()
-        },
+        "values": {name: within(name, sizes) for name, sizes in fields["values"].items()},
     }
+
+
+def _workspace_header(path: StrPath, table: Any) -> dict[str, Any]:
+    """Fields of a workspace that are no columns, with the shapes of its further ones."""
+    shown = os.fspath(path)
+    own = (table.schema.metadata or {}).get(b"tdcr")
+    if own is None:
+        message = f"{shown}: expected the Parquet file of a Workspace, got one of something else"
+        raise InvalidInput(message, "path")
+    try:
+        data = json.loads(own)
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput(f"{shown}: header: not JSON: {error}", "header") from None
+    fields = check_header(path, data, "Workspace")
+    if not isinstance(fields.get("values"), dict):
+        expected = f"{shown}: values: expected shapes by name"
+        raise InvalidInput(f"{expected}, got {fields.get('values')!r}"[:500], "values")
+    return fields
+
+
+def _inner_sizes(shown: str, name: str, sizes: Any) -> list[int]:
+    """Shape of what each row of a further column holds."""
+    whole = isinstance(sizes, list) and all(type(size) is int and size >= 0 for size in sizes)
+    if not whole or not sizes:
+        raise InvalidInput(f"{shown}: {name}: expected a shape, got {sizes!r}"[:500], name)
+    return list(sizes[1:])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from tdcr._value import rebuilt
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -50,6 +51,10 @@ class VoxelMap(NamedTuple):
     """Samples behind each value, (V,)."""
     voxel: float
     """Edge of the voxels [m]."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy with arrays that stay read-only."""
+        return rebuilt, (type(self), *self)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from tdcr import _core
-from tdcr._arguments import several_obstacles
+from tdcr._arguments import numbers, several_obstacles, tendons_of, whole
 from tdcr._chunks import Solver, spread
 from tdcr._progress import told
 from tdcr._workspace_results import Sampling, Workspace
@@ -101,6 +100,9 @@ def workspace(
         "sobol" without scipy.
     Exception
         Whatever a `SignedDistance` raises, or the executor a third time for the same chunk.
+    KeyboardInterrupt
+        On Ctrl-C, as `forward_batch`. Chunks that an executor's workers have in work go on there:
+        leaving its ``with`` waits for them, the less the smaller they are.
 
     Examples
     --------
@@ -112,12 +114,12 @@ def workspace(
     ((121, 3), 0.2)
     """
     kind = _kind(sampling)
-    limits = _limits(ranges, len(robot.tendons))
-    count, size = _whole("samples", samples, 1), _whole("chunk", chunk, 1)
+    limits = _limits(ranges, tendons_of(robot))
+    count, size = whole("samples", samples, 1), whole("chunk", chunk, 1)
     obstacles = several_obstacles(obstacles)
     names = _names(fields)
-    rows = _rows(limits, count, kind, _whole("seed", seed, 0))
-    threads = 1 if executor is not None and threads is None else threads
+    seed = whole("seed", seed, 0)
+    rows = _rows(limits, count, kind, seed)
     solver = Solver(robot, model, settings, obstacles, loads, names, threads)
     # No row: settings, model and fields are checked before anything is solved or sent.
     columns = {
@@ -145,19 +147,6 @@ def workspace(
     )  # fmt: skip
 
 
-def _whole(argument: str, value: object, least: int) -> int:
-    if isinstance(value, bool):
-        raise TypeError(f"{argument}: expected a whole number, got bool")
-    try:
-        number = operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        kind = type(value).__name__
-        raise TypeError(f"{argument}: expected a whole number, got {kind}") from None
-    if number < least:
-        raise InvalidInput(f"{argument}: expected at least {least}, got {number}", argument)
-    return number
-
-
 def _kind(sampling: str) -> Literal["sobol", "grid", "random"]:
     if sampling not in get_args(Sampling):
         expected = '"sobol", "grid" or "random"'
@@ -176,11 +165,7 @@ def _names(fields: Sequence[str]) -> tuple[str, ...]:
 
 def _limits(ranges: ArrayLike, tendons: int) -> NDArray[np.float64]:
     """Ranges as an array of their own, or say what is wrong with them."""
-    try:
-        limits = np.array(ranges, np.float64)
-    except ValueError as error:
-        message = f"ranges: expected an array of shape ({tendons}, 2), got {error}"
-        raise InvalidInput(message, "ranges") from None
+    limits = numbers("ranges", ranges)
     if limits.shape != (tendons, 2):
         expected = f"shape ({tendons}, 2), least and greatest displacement of each tendon"
         raise InvalidInput(f"ranges: expected {expected}, got {limits.shape}", "ranges")

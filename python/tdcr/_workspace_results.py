@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from dataclasses import dataclass
 from numbers import Real
@@ -11,9 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from tdcr import _core
+from tdcr._arguments import whole
 from tdcr._dexterity import manipulability
 from tdcr._status import Status
-from tdcr._value import Value
+from tdcr._value import Value, rebuilt
 from tdcr._voxels import Grid, Volume, VoxelMap, default_voxel, solid_angles, volume
 from tdcr.errors import InvalidInput
 
@@ -45,6 +45,10 @@ class Reach(NamedTuple):
     """Least x, y, z, (3,), world frame [m]."""
     high: Floats
     """Greatest x, y, z, (3,) [m]."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy with arrays that stay read-only."""
+        return rebuilt, (type(self), *self)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,8 +191,7 @@ class Workspace(Value):
         combining concentric tube mechanisms and cable-driven mechanisms", IEEE Robotics and
         Automation Letters 2(2), 2017.
         """
-        if bands < 3:
-            raise InvalidInput(f"bands: expected at least 3, got {bands}", "bands")
+        bands = whole("bands", bands, 3)
         points = self._points()
         grid = Grid.of(points, self._voxel(voxel, points))
         return solid_angles(grid, self.directions[self.ok], bands)
@@ -226,8 +229,7 @@ class Workspace(Value):
             what = "loads" if self.loads is not None else "obstacles"
             message = f"{what}: expected none for the Jacobian, got some"
             raise InvalidInput(message, what)
-        if rows < 1:
-            raise InvalidInput(f"rows: expected at least 1, got {rows}", "rows")
+        rows = whole("rows", rows, 1)
         self._points()
         converged = np.flatnonzero(self.ok)
         step = -(-len(converged) // rows)
@@ -336,6 +338,8 @@ class Workspace(Value):
             return default_voxel(points)
         if not isinstance(voxel, Real) or isinstance(voxel, bool):
             raise TypeError(f"voxel: expected a number [m], got {type(voxel).__name__}")
-        if not (math.isfinite(voxel) and voxel > 0):
-            raise InvalidInput(f"voxel: expected a positive finite edge [m], got {voxel}", "voxel")
+        # Volumes beyond overflow, and so do counts of voxels.
+        if not 1e-100 <= voxel <= 1e100:
+            expected = "a positive finite edge, from 1e-100 to 1e100 [m]"
+            raise InvalidInput(f"voxel: expected {expected}, got {voxel}", "voxel")
         return float(voxel)

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from tdcr import _core
+from tdcr._value import rebuilt
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -54,6 +55,10 @@ class ArcFit(NamedTuple):
     residual: Any
     """Displacement given minus displacement of the arc, (N,) or (B, N) [m]; 0 for tendons that do
     not count."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy with arrays that stay read-only."""
+        return rebuilt, (type(self), *self)
 
 
 def arc_from_displacements(

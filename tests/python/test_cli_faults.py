@@ -69,7 +69,7 @@ BAD = [
     (["workspace", "--ranges", "free"], "expected a tendon that is not free"),
     (["workspace", "--ranges", "0:-1"], "ranges: expected least <= greatest"),
     (["workspace", "--ranges", "-1:0 0"], "ranges: expected shape (3, 2)"),
-    (["workspace", "--ranges", "-1:0", "--samples", "0"], "samples: expected at least 1, got 0"),
+    (["workspace", "--ranges", "-1:0", "--samples", "0"], "samples: expected 1 or more, got 0"),
     (["workspace", "--ranges", "-1:0", "--output", "w.txt"], "expected a file ending in .npz"),
     (["workspace", "--ranges", "-1:0", "--plot", "w.txt"], "expected a picture file"),
 ]

@@ -48,11 +48,11 @@ def test_a_table_is_read_in_metres_with_negative_pulls(path):
         [0.005, 0.006, 0.007],
     ]
     assert found.lines.tolist() == [3, 4, 8]
-    assert found.dropped == 3
+    assert found.dropped == 2  # The empty line is no row.
     assert len(found) == 3
     assert found.displacement_columns == ("d_left_mm", "d_right_mm")
     assert found.position_columns == ("tip_x_mm", "tip_y_mm", "tip_z_mm")
-    assert "3 rows, 3 dropped: 2 displacements (d_left_mm, d_right_mm), 1 point" in repr(found)
+    assert "3 rows, 2 dropped: 2 displacements (d_left_mm, d_right_mm), 1 point" in repr(found)
 
 
 def test_the_sign_and_slack_are_as_they_are_said_to_be(path):
@@ -135,6 +135,7 @@ def test_units_are_exact(unit, metres, tmp_path):
         ({"displacements": []}, "displacements", "expected columns, got none"),
         ({"positions": ["tip_x_mm", "tip_y_mm"]}, "positions", "got 2 of them"),
         ({"positions": ["tip_x_mm"] * 3}, "positions", "once each"),
+        ({"displacements": ["tip_x_mm"]}, "positions", "of displacements, got 'tip_x_mm' in both"),
     ],
 )
 def test_wrong_options_are_refused(path, options, argument, text):
@@ -151,6 +152,8 @@ def test_unit_and_sign_have_no_default(path):
         tdcr.read_measurements(path, unit="mm")
     with pytest.raises(TypeError, match="names of columns"):
         read(path, displacements="d_left_mm")
+    with pytest.raises(TypeError, match="unit: expected the name of a unit, got list"):
+        read(path, unit=["mm"])
 
 
 WRONG = {
@@ -168,6 +171,8 @@ WRONG = {
     b"d1;x;y;z\n1,5;2;3;4\n": "got '1,5'; decimals have a point",
     b"d1,x,y,z\n1_0,2,3,4\n": "expected a number, inf or free [mm], got '1_0'",
     b"d1,x,y,z\n1,2,3,4,\n1,2,3,4,5\n": "line 3: expected 4 cells, as many as names of columns",
+    b"# d1,x,y,z\n1,2,3,4\n": "got '1,2,3,4'; lines that start with # are comments",
+    b'd1,x,y,z,note\n1,2,3,4,ok\n1,2,3,4,"five\n1,2,3,4,ok\n': "line 3: expected cells as of a CSV",
     b"d1,x,y,z\n,2,3,4\n1,2\n": "expected a row without gaps, got none in 2",
 }
 
@@ -180,6 +185,48 @@ def test_what_is_no_table_says_where(content, tmp_path):
         read(path)
     assert str(error.value).startswith(f"{path}: ")
     assert WRONG[content] in str(error.value)
+
+
+def test_lines_are_those_of_an_editor(tmp_path):
+    """Quoted cells over two lines, blank lines, comments, a form feed; with any line ends."""
+    lines = [
+        "",
+        "# of the bench",
+        '"d1 [mm]",x,y,"z',
+        ' [mm]",note',
+        "-1,2,3,4,quiet\x0c",
+        "   ",
+        '-1,2,3,5,"two',
+        'lines"',
+        "  # aside",
+        '"-1",2,3,6,',
+    ]
+    path = tmp_path / "t.csv"
+    for end in ("\n", "\r\n", "\r"):
+        path.write_bytes(end.join(lines).encode("utf-8-sig"))
+        found = read(path, pull_sign="negative")
+        assert found.positions[:, 2].tolist() == [0.004, 0.005, 0.006]
+        assert found.lines.tolist() == [5, 7, 10]
+        assert found.position_columns == ("x", "y", "z [mm]")
+        assert found.dropped == 0
+
+
+def test_micrometres_are_written_in_three_ways(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("d1 [um],x [\u00b5m],y ( \u03bcm ),z_\u00b5m\n-1,2,3,4\n", "utf-8")
+    assert read(path, unit="um", pull_sign="negative").positions.tolist() == [[2e-6, 3e-6, 4e-6]]
+    with pytest.raises(tdcr.InvalidInput, match=r"unit: column 'd1 \[um\]' says 'um', got 'mm'"):
+        read(path)
+
+
+@pytest.mark.parametrize(("cells", "sign"), [("1,0", "negative"), ("-1,free", "positive")])
+def test_releases_alone_are_told(cells, sign, tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text(f"d1,d2,x,y,z\n0,0,1,2,3\n{cells},1,2,3\n")
+    with pytest.warns(RuntimeWarning, match=rf"t\.csv: no row pulls .* if pulls are {sign}: is it"):
+        read(path, pull_sign=sign)
+    path.write_text("d1,d2,x,y,z\n0,0,1,2,3\nfree,0,1,2,3\n")
+    assert read(path, pull_sign=sign).displacements[1].tolist() == [math.inf, 0.0]
 
 
 def test_a_missing_file_is_an_os_error(tmp_path):

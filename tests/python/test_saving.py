@@ -3,132 +3,24 @@
 from __future__ import annotations
 
 import json
-import math
 import zipfile
 
 import numpy as np
 import pytest
+from saved_results import RESULTS, SHAPES, arm, batch, workspace
 
 import tdcr
 from tdcr._core import _shape
 
-AZIMUTHS = (0.0, 2.1, 4.2)
+try:
+    import resource
+except ImportError:  # Not on Windows.
+    resource = None
 
-
-def arm(**spine):
-    tendons = [
-        tdcr.Tendon.helical(AZIMUTHS[0], 0.01, turns=0.3, name="wound"),
-        tdcr.Tendon(AZIMUTHS[1], 0.01, end=5, stiffness=1e4 if spine else None),
-        tdcr.Tendon.from_holes([1] * 9, 3, 0.01, azimuth=0.1),
-    ]
-    rest = np.random.default_rng(3).normal(size=(8, 3)) * 0.03
-    base = np.eye(4)
-    base[:3, 3] = 0.1, -1 / 3, 0.2
-    backbone = tdcr.Backbone([0.1, 0.09], [4, 4], rest=rest, **spine)
-    return tdcr.Robot(backbone, tendons, base=base, name="arm é")
-
-
-def steel():
-    return arm(youngs_modulus=2e11, diameter=0.001)
-
-
-def touching():
-    """Shape among every kind of obstacle, under loads, with contacts."""
-    robot = tdcr.Robot(
-        tdcr.Backbone(0.2, 10, youngs_modulus=6e10, diameter=0.001), [tdcr.Tendon(0.0, 0.01)]
-    )
-    corner = [[0.4, 0, 0], [0.5, 0, 0], [0.4, 0.1, 0], [0.4, 0, 0.1]]
-    obstacles = (
-        tdcr.Cylinder([0.035, 0, 0.1], [0, 1, 0], 0.02),
-        tdcr.Sphere([0, 0, 0], 1.0, inside=True),
-        tdcr.Box([0.5, 0.5, 0.5], [0.1, 0.1, 0.1], np.eye(3)),
-        tdcr.Capsule([1, 0, 0], [1, 1, 0], 0.1),
-        tdcr.HalfSpace([0, 0, -0.5], [0, 0, 1]),
-        tdcr.Mesh(corner, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
-    )
-    shape = tdcr.forward(
-        robot, [-0.012], obstacles=obstacles, loads=tdcr.Loads(tip_force=[0, 0, -0.01])
-    )
-    assert shape.contacts
-    return shape
-
-
-def infeasible():
-    shape = tdcr.forward(straight(), [-0.01, 0, 0])
-    assert shape.message
-    return shape
-
-
-SHAPES = {
-    "rod": lambda: tdcr.forward(arm(), [-0.01, math.inf, -1 / 300]),
-    "steel": lambda: tdcr.forward(
-        steel(), [-0.01, math.inf, math.inf], settings=tdcr.RodSettings(elements=2, axial=True)
-    ),
-    "linkage": lambda: tdcr.forward(straight(), [-0.01, math.inf, math.inf], model="linkage"),
-    "curvature": lambda: tdcr.forward(
-        tdcr.Robot(tdcr.Backbone(0.1, 4), [tdcr.Tendon(a, 0.01) for a in AZIMUTHS]),
-        [-0.01, 0.001, 0.002],
-        model="constant_curvature",
-        settings=tdcr.ConstantCurvatureSettings(extensible=True),
-    ),
-    "touching": touching,
-    "infeasible": infeasible,
-    "bare": lambda: tdcr.forward(tdcr.Robot(tdcr.Backbone(0.1, 2), []), []),
-}
-
-
-def straight():
-    return tdcr.Robot(tdcr.Backbone(0.2, 8), [tdcr.Tendon(a, 0.01) for a in AZIMUTHS])
-
-
-def batch(**options):
-    rows = np.random.default_rng(0).uniform(-0.01, 0, (5, 1)) * [1, 0, 0] + [0, math.inf, math.inf]
-    return tdcr.forward_batch(straight(), rows, fields=tdcr._batch.FIELDS, **options)
-
-
-def touching_batch():
-    shape = touching()
-    return tdcr.forward_batch(
-        shape.robot,
-        [[-0.01], [-0.012]],
-        obstacles=shape.obstacles,
-        loads=shape.loads,
-        fields=("contacts", "tendon_points"),
-    )
-
-
-def workspace(**options):
-    return tdcr.workspace(
-        straight(), [(-0.01, 0), (math.inf, math.inf), (-0.01, 0)], 9, sampling="random", **options
-    )
-
-
-def inverse(target, **options):
-    return tdcr.inverse(straight(), target, model="constant_curvature", **options)
-
-
-RESULTS = {
-    **SHAPES,
-    "batch": batch,
-    "warm batch": lambda: batch(warm=True),
-    "linkage batch": lambda: batch(model="linkage"),
-    "touching batch": touching_batch,
-    "no rows": lambda: tdcr.forward_batch(straight(), np.empty((0, 3)), fields=("tip", "strains")),
-    "workspace": workspace,
-    "workspace with fields": lambda: workspace(fields=("frames", "strains", "energy"), seed=4),
-    "inverse": lambda: tdcr.inverse(straight(), [0.05, 0.02, 0.17]),
-    "unreachable": lambda: inverse([0.0, 0.2, 0.3], search=tdcr.InverseSettings(starts=3)),
-    "frame": lambda: inverse(
-        tdcr.forward(straight(), [-0.01, 0.005, 0.005], model="constant_curvature").tip,
-        bounds=tdcr.Bounds(displacement=(-0.02, [0.02, 0.03, math.inf])),
-        search=tdcr.InverseSettings(rotation_weight=(1, 1, 0), swarm=tdcr.PsoSettings(seed=3)),
-        method="pso",
-    ),
-    "track": lambda: tdcr.track(straight(), [[0.05, 0.02, 0.17], [0.05, 0.01, 0.17], [1, 1, 1]]),
-    "frames": lambda: tdcr.inverse_batch(
-        straight(), [np.eye(4)], model="constant_curvature", search=tdcr.InverseSettings(starts=2)
-    ),
-}
+# Lists in lists, deeper than Python calls itself.
+DEEP: list[object] = []
+for _ in range(400):
+    DEEP = [DEEP]
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".json"])
@@ -190,7 +82,7 @@ def test_files_say_what_they_are_and_others_can_read_them(tmp_path):
 def test_nothing_of_a_file_is_run(tmp_path):
     path = tmp_path / "s.npz"
     np.savez(path, header=np.array({"a": 1}, dtype=object))
-    with pytest.raises(tdcr.InvalidInput, match=r"s\.npz: not an npz file.*allow_pickle=False"):
+    with pytest.raises(tdcr.InvalidInput, match=r"s\.npz: .*: it holds pickled objects, "):
         tdcr.Shape.load(path)
     SHAPES["rod"]().save(tmp_path / "s.json")
     data = json.loads((tmp_path / "s.json").read_text())
@@ -255,6 +147,11 @@ def saved(tmp_path):
         ({"robot": {"format": 1}}, "robot: length_unit: missing"),
         ({"robot": None}, "robot: file: expected a table"),
         ({"loads": {"type": "Loads", "gravity": [0, 0]}}, "loads: gravity: expected"),
+        ({"format": [1]}, r"format: expected 1, got \[1\]$"),
+        ({"kind": ["Shape"]}, r"got the kind \['Shape'\]"),
+        ({"energy": 10**400}, "energy: int too large to convert"),
+        ({"energy": [1.0]}, r"energy: expected a number, got \[1.0\]"),
+        ({"settings": {"type": ["RodSettings"]}}, "settings: type: expected one of RodSettings"),
     ],
 )
 def test_a_changed_file_says_where_it_is_wrong(saved, tmp_path, change, text):
@@ -263,6 +160,63 @@ def test_a_changed_file_says_where_it_is_wrong(saved, tmp_path, change, text):
     with pytest.raises(tdcr.InvalidInput, match=text) as error:
         load()
     assert str(error.value).startswith(str(tmp_path / "s.json"))
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "text"),
+    [
+        ("inverse", {"target": [[0.0], [0.0, 1.0]]}, "target: expected shape|rectangular"),
+        ("inverse", {"target": []}, r"target: expected shape \(3\)"),
+        ("inverse", {"loads": DEEP}, "nested too deeply|loads: type"),
+        ("inverse", {"target": DEEP}, "nested too deeply|target: expected"),
+        ("track", {"targets": [{}, {}]}, "targets: expected numbers"),
+        ("no frames", {"frames": None}, "frames: expected true or false, got None"),
+        ("touching batch", {"contacts": {"row": 3}}, "contacts: expected columns"),
+        ("workspace", {"seed": -1}, "seed: expected a whole number, got -1"),
+    ],
+)
+def test_changed_files_of_other_kinds_say_so_too(name, change, text, tmp_path):
+    result = RESULTS[name]()
+    path = tmp_path / "r.json"
+    result.save(path)
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(tdcr.InvalidInput, match=text) as error:
+        type(result).load(path)
+    assert str(error.value).startswith(str(path))
+
+
+def test_a_table_of_contacts_without_rows_says_so(tmp_path):
+    result = RESULTS["touching batch"]()
+    path = tmp_path / "r.json"
+    result.save(path)
+    data = json.loads(path.read_text())
+    data["contacts"]["row"] = 7
+    path.write_text(json.dumps(data))
+    with pytest.raises(tdcr.InvalidInput, match=r"contacts\.row: expected an array, got 7"):
+        type(result).load(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"frames": {"array": ["frames"]}}, r"header: expected the name of an array, got \['fr"),
+        ({"frames": {"array": "no"}}, "no: the array is missing"),
+        ({"kind": {"array": "frames"}}, "got the kind array"),
+        ({"format": {"array": "frames"}}, "format: expected 1, got array"),
+        ({"energy": {"array": "frames"}}, "energy: expected a number, got array"),
+        ({"loads": {"type": {"array": "frames"}}}, "loads: type: expected one of Loads"),
+    ],
+)
+def test_a_changed_header_says_where_it_is_wrong(change, text, tmp_path):
+    path = tmp_path / "s.npz"
+    SHAPES["rod"]().save(path)
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    header = json.loads(str(arrays.pop("header"))) | change
+    np.savez(path, header=np.array(json.dumps(header)), **arrays)
+    with pytest.raises(tdcr.InvalidInput, match=text) as error:
+        tdcr.Shape.load(path)
+    assert str(error.value).startswith(str(path))
 
 
 def test_every_field_of_a_shape_is_needed_but_what_follows_from_others(saved):
@@ -312,6 +266,55 @@ def test_a_robot_file_is_known(tmp_path):
         tdcr.Shape.load(tmp_path / "r.json")
 
 
+def test_a_robot_file_is_told_from_results(tmp_path):
+    path = tmp_path / "s.json"
+    SHAPES["rod"]().save(path)
+    with pytest.raises(tdcr.InvalidInput) as error:
+        tdcr.Robot.load(path)
+    got = "a Shape, which tdcr.Shape.load reads: its .robot is the robot"
+    assert str(error.value) == f"{path}: kind: expected a robot file, got {got}"
+    assert error.value.argument == "kind"
+
+
+@pytest.mark.skipif(resource is None, reason="needs limits of processes")
+@pytest.mark.parametrize("suffix", [".npz", ".json", ".csv", ".parquet"])
+@pytest.mark.parametrize("older", [False, True])
+def test_a_full_disk_leaves_no_half_of_a_file(suffix, older, tmp_path):
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    path = tmp_path / f"w{suffix}"
+    if older:
+        path.write_bytes(b"older")
+    cloud = workspace(fields=("frames",))
+    # Files beyond a limit fail as on a full disk: when they are written, or when they are closed.
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (700, limits[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            cloud.save(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [(path.name, b"older")] * older
+
+
+def test_a_folder_in_the_way_is_named(tmp_path):
+    path = tmp_path / "s.npz"
+    path.mkdir()
+    with pytest.raises(IsADirectoryError) as error:
+        SHAPES["rod"]().save(path)
+    assert error.value.filename == str(path)
+    assert error.value.filename2 is None
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_name_too_long_is_the_one_given(tmp_path):
+    path = tmp_path / ("s" * 250 + ".npz")  # As long as names may be; that beside it is longer.
+    with pytest.raises(OSError, match="too long") as error:
+        SHAPES["rod"]().save(path)
+    assert error.value.filename == str(path)
+    assert not list(tmp_path.iterdir())
+
+
 def test_other_npz_files_are_told_from_ours(tmp_path):
     np.savez(tmp_path / "a.npz", x=np.arange(3))
     with pytest.raises(tdcr.InvalidInput, match=r"header: expected the text .* got members x"):
@@ -320,6 +323,10 @@ def test_other_npz_files_are_told_from_ours(tmp_path):
         np.save(stream, np.arange(3))
     with pytest.raises(tdcr.InvalidInput, match="a single array"):
         tdcr.Shape.load(tmp_path / "b.npz")
+    with zipfile.ZipFile(tmp_path / "c.npz", "w") as archive:
+        archive.writestr("header", "of something else")
+    with pytest.raises(tdcr.InvalidInput, match=r"c\.npz: header: .* got members none"):
+        tdcr.Shape.load(tmp_path / "c.npz")
 
 
 def test_an_npz_without_one_of_its_arrays(tmp_path):
@@ -366,96 +373,3 @@ def test_a_state_that_does_not_fit_the_robot_is_no_panic():
     _, state = shape.__reduce__()
     with pytest.raises(tdcr.InvalidInput, match="frames"):
         _shape(*state[:4], state[4][:3], *state[5:])
-
-
-def table(path):
-    header, *rows = path.read_text("utf-8").splitlines()
-    return header.split(","), [row.split(",") for row in rows]
-
-
-def test_csv_of_a_shape_has_a_row_per_disk(tmp_path):
-    shape = SHAPES["rod"]()
-    shape.save(tmp_path / "s.csv")
-    header, rows = table(tmp_path / "s.csv")
-    assert header == ["disk", "x [m]", "y [m]", "z [m]"]
-    assert [int(row[0]) for row in rows] == list(range(9))
-    assert np.array_equal([[float(x) for x in row[1:]] for row in rows], shape.positions)
-
-
-def test_csv_of_many_rows(tmp_path):
-    rows = batch()
-    rows.save(tmp_path / "b.csv")
-    header, lines = table(tmp_path / "b.csv")
-    assert header[:6] == [
-        "row", "status", "displacement t0 [m]", "displacement t1 [m]", "displacement t2 [m]",
-        "tip x [m]",
-    ]  # fmt: skip
-    assert "disk 8 z [m]" in header
-    assert "tension t0 [1/m^2]" in header
-    assert "energy [1/m]" in header
-    at = header.index("tip x [m]")
-    assert [float(line[at]) for line in lines] == rows.tip[:, 0, 3].tolist()
-    assert lines[0][3] == "inf"
-    cloud = workspace()
-    cloud.save(tmp_path / "w.csv")
-    header, lines = table(tmp_path / "w.csv")
-    assert header[-3:] == ["direction x", "direction y", "direction z"]
-    assert len(lines) == 9
-    path = RESULTS["track"]()
-    path.save(tmp_path / "t.csv")
-    header, lines = table(tmp_path / "t.csv")
-    assert header[:6] == [
-        "row", "status", "target x [m]", "target y [m]", "target z [m]", "error [m]",
-    ]  # fmt: skip
-    assert lines[2][1] == "unreachable"
-
-
-def test_no_csv_of_one_inverse(tmp_path):
-    with pytest.raises(tdcr.InvalidInput, match=r"expected \.npz or \.json for an Inverse"):
-        RESULTS["inverse"]().save(tmp_path / "i.csv")
-
-
-@pytest.mark.parametrize("name", ["workspace", "workspace with fields"])
-def test_parquet_of_a_workspace_loads_equal(name, tmp_path):
-    pytest.importorskip("pyarrow")
-    cloud = RESULTS[name]()
-    cloud.save(tmp_path / "w.parquet")
-    assert tdcr.Workspace.load(tmp_path / "w.parquet") == cloud
-
-
-def test_parquet_of_batches_is_for_other_programs(tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    for result in (batch(), RESULTS["track"]()):
-        result.save(tmp_path / "b.parquet")
-        read = parquet.read_table(tmp_path / "b.parquet")
-        assert read["displacement t0 [m]"].to_pylist() == result.displacements[:, 0].tolist()
-        with pytest.raises(tdcr.InvalidInput, match=r"\.parquet files are for other programs"):
-            type(result).load(tmp_path / "b.parquet")
-    with pytest.raises(tdcr.InvalidInput, match="expected the Parquet file of a Workspace"):
-        tdcr.Workspace.load(tmp_path / "b.parquet")
-    with pytest.raises(tdcr.InvalidInput, match=r"no \.parquet for Shape"):
-        SHAPES["rod"]().save(tmp_path / "s.parquet")
-
-
-def test_parquet_without_pyarrow_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
-    with pytest.raises(ImportError, match=r"pip install tdcr\[parquet\]"):
-        workspace().save(tmp_path / "w.parquet")
-
-
-def test_other_endings_are_refused_before_anything_is_written(tmp_path):
-    for result in (SHAPES["rod"](), batch(), workspace()):
-        with pytest.raises(tdcr.InvalidInput, match=r"expected a file ending in \.npz"):
-            result.save(tmp_path / "r.pkl")
-    with pytest.raises(FileNotFoundError, match="none"):
-        SHAPES["rod"]().save(tmp_path / "none" / "s.npz")
-    assert not list(tmp_path.iterdir())
-
-
-def test_the_plotting_layout_is_columns_of_frames():
-    shape = SHAPES["steel"]()
-    flat = shape.plotting_layout()
-    assert flat.shape == (9, 16)
-    assert not flat.flags.writeable
-    assert np.array_equal(flat.reshape(9, 4, 4).transpose(0, 2, 1), shape.frames)
-    assert flat[-1, 12:].tolist() == [*shape.positions[-1], 1.0]

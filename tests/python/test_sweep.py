@@ -11,6 +11,11 @@ from interrupts import assert_interrupts
 import tdcr
 from tdcr import InvalidInput, ShapeBatch, Status
 
+try:
+    import resource
+except ImportError:  # Not on Windows.
+    resource = None
+
 ROWS = 1000
 BALL = tdcr.Sphere((0.05, 0.0, 0.12), 0.02)
 ALL = ("tip", "frames", "positions", "strains", "tendon_points", "tendon_lengths", "tensions",
@@ -71,6 +76,13 @@ def test_a_table_is_that_of_a_batch_with_a_row_group_per_chunk(robot, pulls, mod
         np.testing.assert_array_equal(swept[name].to_numpy(), whole[name].to_numpy())
     found = parquet.ParquetFile(tmp_path / "sweep.parquet").metadata
     assert [found.row_group(i).num_rows for i in range(found.num_row_groups)] == [300] * 3 + [100]
+    # In the middle of a column's last numbers: pages carry checksums.
+    column = found.row_group(0).column(2)
+    raw = bytearray((tmp_path / "sweep.parquet").read_bytes())
+    raw[column.data_page_offset + column.total_compressed_size - 9] ^= 1
+    (tmp_path / "sweep.parquet").write_bytes(raw)
+    with pytest.raises(OSError, match=r"(?i)crc"):
+        parquet.read_table(tmp_path / "sweep.parquet", page_checksum_verification=True)
 
 
 def blocks(pulls):
@@ -87,6 +99,7 @@ def blocks(pulls):
         blocks,
         np.ndarray.tolist,
         lambda pulls: iter([pulls.tolist()]),
+        lambda pulls: [pulls[:300], pulls[300:]],
         lambda pulls: lambda first, count: pulls[first : first + count],
         lambda pulls: lambda first, count: pulls[first : first + count // 2],
         np.asfortranarray,
@@ -205,6 +218,7 @@ def test_what_fails_on_the_way_leaves_no_file(
         ({"progress": 3}, TypeError, "progress: "),
         ({"obstacles": tdcr.SignedDistance(lambda p: 1.0)}, InvalidInput, "SignedDistance"),
         ({"displacements": 3}, TypeError, "displacements: expected an array, an iterator"),
+        ({"robot": "arm.toml"}, TypeError, "robot: expected a Robot, got str"),
         ({"displacements": [0.0] * 6}, InvalidInput, r"displacements: expected shape \(B, 6\)"),
         ({"displacements": np.zeros((4, 5))}, InvalidInput, r"got shape \(4, 5\)"),
         ({"displacements": [[0.0], [0.0, 1.0]]}, InvalidInput, "displacements: expected a rect"),
@@ -218,7 +232,7 @@ def test_misuse_is_refused_before_a_row_is_solved(robot, keywords, error, text, 
     given = {"displacements": np.zeros((3, 6)), "progress": solved.append, **keywords}
     path = tmp_path / given.pop("path", "s.npz")
     with pytest.raises(error, match=text):
-        tdcr.sweep(robot, given.pop("displacements"), path, **given)
+        tdcr.sweep(given.pop("robot", robot), given.pop("displacements"), path, **given)
     assert solved == []
     assert os.listdir(tmp_path) == ["folder.npz"]
 
@@ -241,6 +255,25 @@ def test_what_was_done_is_a_value(robot, tmp_path):
     assert hash(done) == hash(tdcr.Sweep(done.path, 3, {}, done.seconds))
     with pytest.raises(AttributeError):
         done.rows = 4
+
+
+@pytest.mark.skipif(resource is None, reason="needs limits of processes")
+@pytest.mark.parametrize("ending", ["npz", "parquet"])
+@pytest.mark.parametrize("chunk", [50, 100_000])
+def test_a_full_disk_leaves_no_half_of_a_file(robot, pulls, chunk, ending, tmp_path):
+    """On the way, or when all is put together at the end: the older file stays."""
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    path = tmp_path / f"s.{ending}"
+    path.write_bytes(b"older")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            tdcr.sweep(robot, pulls, path, model="constant_curvature", chunk=chunk)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [(p.name, p.read_bytes()) for p in tmp_path.iterdir()] == [(path.name, b"older")]
 
 
 @pytest.mark.parametrize("ending", ["npz", "parquet"])

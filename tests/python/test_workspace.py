@@ -1,11 +1,8 @@
 """Workspaces: samples, chunks, executors, and what is read off the cloud of tips."""
 
 import math
-import multiprocessing
-import os
 import pickle
 import sys
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -209,88 +206,6 @@ def test_manipulability_is_the_mean_of_the_jacobians():
         among.manipulability()
 
 
-class Dying(ProcessPoolExecutor):
-    """Its third task ends the worker that takes it."""
-
-    tasks = 0
-
-    def submit(self, function, /, *args):
-        self.tasks += 1
-        return super().submit(*((os._exit, 1) if self.tasks == 3 else (function, *args)))
-
-
-class Losing(ThreadPoolExecutor):
-    """Loses the first tries of the second piece, as a scheduler does whose workers die."""
-
-    def __init__(self, losses):
-        super().__init__(2)
-        self.losses, self.tasks = losses, 0
-
-    def submit(self, function, /, *args):
-        self.tasks += 1
-        if self.tasks == 2 or (self.tasks > 10 and self.losses > 0):
-            self.losses -= 1
-            lost = Future()
-            lost.set_exception(RuntimeError("worker lost"))
-            return lost
-        return super().submit(function, *args)
-
-
-def spawned(kind=ProcessPoolExecutor):
-    return kind(2, mp_context=multiprocessing.get_context("spawn"))
-
-
-def test_processes_give_the_same_rows():
-    told = []
-    with spawned() as executor:
-        found = sample(chunk=100, executor=executor, progress=told.append, fields="energy")
-        rod = sample(60, model="rod", chunk=7, executor=executor)
-    assert same_rows(found, sample())
-    assert np.array_equal(found.values["energy"], sample(fields="energy").values["energy"])
-    assert told == list(range(100, 1001, 100))
-    assert same_rows(rod, sample(60, model="rod"))
-
-
-def test_a_dead_worker_costs_no_row():
-    with (
-        spawned(Dying) as executor,
-        pytest.warns(RuntimeWarning, match="executor: broken .*; what is left is solved in this"),
-    ):
-        found = sample(chunk=100, executor=executor)
-    assert same_rows(found, sample())
-
-
-def test_lost_pieces_are_given_again_but_not_for_ever():
-    with Losing(2) as executor:
-        assert same_rows(sample(chunk=100, executor=executor), sample())
-        assert executor.tasks == 12
-    with Losing(3) as executor, pytest.raises(RuntimeError, match="worker lost"):
-        sample(chunk=100, executor=executor)
-
-
-def test_errors_of_a_solve_are_not_tried_again():
-    calls = []
-
-    def distance(points):
-        calls.append(1)
-        raise ZeroDivisionError("mine")
-
-    obstacle = tdcr.SignedDistance(distance)
-    with ThreadPoolExecutor(1) as executor, pytest.raises(ZeroDivisionError, match="mine"):
-        sample(8, model="rod", obstacles=obstacle, executor=executor)
-    assert len(calls) == 1
-
-
-def test_a_dask_cluster_gives_the_same_rows():
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        found = sample(chunk=100, executor=client.get_executor())
-    assert same_rows(found, sample())
-
-
 def test_without_scipy_sobol_says_what_to_do(monkeypatch):
     monkeypatch.setitem(sys.modules, "scipy.stats", None)
     with pytest.raises(ImportError, match=r'pip install tdcr\[sobol\]; sampling="random" and "gri'):
@@ -339,18 +254,21 @@ def test_pictures_show_what_is_asked():
         ),
         ("ranges", "got (nan", lambda: tdcr.workspace(ROBOT, [(np.nan, 0)] * 6, 9, **MODEL)),
         ("ranges", "inf)", lambda: tdcr.workspace(ROBOT, [(0, np.inf)] * 6, 9, **MODEL)),
-        ("samples", "at least 1, got 0", lambda: sample(0)),
+        ("samples", "1 or more, got 0", lambda: sample(0)),
         ("samples", "at least 2^6", lambda: sample(63, sampling="grid")),
         ("sampling", "got 'halton'", lambda: sample(sampling="halton")),
-        ("seed", "at least 0, got -1", lambda: sample(seed=-1)),
-        ("chunk", "at least 1, got 0", lambda: sample(chunk=0)),
+        ("seed", "0 or more, got -1", lambda: sample(seed=-1)),
+        ("chunk", "1 or more, got 0", lambda: sample(chunk=0)),
         ("fields", "got 'contacts'", lambda: sample(fields=("energy", "contacts"))),
         ("settings", "for model", lambda: sample(settings=tdcr.RodSettings())),
         ("model", 'got "rods"', lambda: sample(model="rods")),
         ("voxel", "got 0", lambda: sample().volume(0)),
+        ("voxel", "got 1e+300", lambda: sample().volume(1e300)),
+        ("voxel", "got 5e-324", lambda: sample().dexterity(5e-324)),
+        ("voxel", "got nan", lambda: sample().volume(math.nan)),
         ("voxel", "fewer than 2^60", lambda: sample().volume(1e-12)),
-        ("bands", "at least 3", lambda: sample().dexterity(bands=2)),
-        ("rows", "at least 1", lambda: sample().manipulability(rows=0)),
+        ("bands", "3 or more", lambda: sample().dexterity(bands=2)),
+        ("rows", "1 or more", lambda: sample().manipulability(rows=0)),
         ("part", "got 'all'", lambda: sample(9).manipulability(part="all")),
     ],
 )
@@ -366,9 +284,14 @@ def test_wrong_types_are_type_errors():
         lambda: sample(10.5),
         lambda: sample(seed="one"),
         lambda: sample(chunk=True),
+        lambda: tdcr.workspace(3, RANGES, 9),
+        lambda: tdcr.workspace(ROBOT, np.array(RANGES) * 1j, 9),
+        lambda: tdcr.workspace(ROBOT, "wide", 9),
+        lambda: sample().dexterity(bands=3.5),
+        lambda: sample().manipulability(rows="all"),
         lambda: sample().volume("small"),
     ):
-        with pytest.raises(TypeError, match="expected a"):
+        with pytest.raises(TypeError, match=r"expected (a|numbers)"):
             call()
 
 
