@@ -91,9 +91,10 @@ def inverse(
     Raises
     ------
     InvalidInput
-        Both or neither of target and positions, one that is not finite, a frame that is no rigid
-        motion, bounds or a start that do not fit the robot, a model without inverse, proportional
-        tendons, obstacles, loads or positions for another model than the rod.
+        Both or neither of target and positions, one that is not finite or further from the base
+        than a million lengths of the robot and its tool, a frame that is no rigid motion, bounds
+        or a start that do not fit the robot, a model without inverse, proportional tendons,
+        obstacles, loads or positions for another model than the rod.
     Exception
         What the function of a `SignedDistance` raises.
 

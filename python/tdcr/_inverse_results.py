@@ -52,13 +52,15 @@ class Inverse(Value):
     status: Status
     """converged: the target is met, with the least bending energy (rod: the least sum of squared
     tensions) nearby where there is freedom;
-    unreachable: the nearest answer that was found; infeasible: the bounds exclude each other;
+    unreachable: the nearest answer that was found; infeasible: the bounds exclude each other, or
+    no shape was found at all (`error` is NaN);
     iteration_limit, numerical_error: stopped before either."""
     message: str
     """What stood in the way; empty when it converged, unless from rest the displacements lead to
     another shape."""
     error: float
-    """Distance from the tool to the target, over the axes that count; the largest of a disk [m]."""
+    """Distance from the tool to the target, over the axes that count; the largest of a disk [m].
+    NaN where no shape was found."""
     rotation_error: float
     """Angle from the tool to the target, over the axes that count [rad]; 0 for a position."""
     iterations: int
@@ -235,6 +237,8 @@ class InverseBatch(Value, Sequence[Inverse]):
         """Tell what stood in the way of a row; the core keeps no texts of many rows."""
         if self.ok[i]:
             return ""
+        if self.status[i] is Status.infeasible and np.isnan(self.error[i]):
+            return f"row {i}: no shape was found{self._where()}"
         if self.status[i] is Status.infeasible:
             return f"row {i}: the bounds leave the robot no shape"
         off = f"{self.error[i]:.3g} m"
@@ -242,6 +246,12 @@ class InverseBatch(Value, Sequence[Inverse]):
             off += f" and {self.rotation_error[i]:.3g} rad"
         tried = int(self.starts[i])
         return f"row {i} is {off} off the target after {tried} start{'s' if tried != 1 else ''}"
+
+    def _where(self) -> str:
+        """Tell what there is around the robot."""
+        around = [" among the obstacles"] * bool(self.obstacles)
+        around += [" under the loads"] * (self.loads is not None)
+        return " and".join(around)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the answers into a file that appears complete or not at all.

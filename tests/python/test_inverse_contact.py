@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from interrupts import assert_interrupts
 
 import tdcr
 from tdcr import Status
@@ -124,3 +125,81 @@ def test_a_function_that_fails_at_once_panics_nowhere(call, capfd):
     with pytest.raises(ZeroDivisionError, match="no distance anywhere"):
         call(ROBOT, target, obstacles=tdcr.SignedDistance(broken))
     assert "panicked" not in capfd.readouterr().err
+
+
+def test_answers_that_rest_leads_to_are_told_from_others():
+    """Tendons of a segment depend on each other: rounding must not look like another shape."""
+    bone = tdcr.Backbone([0.06] * 3, [7] * 3, youngs_modulus=200e9, diameter=0.001)
+    ends = [7 * (k // 3 + 1) for k in range(9)]
+    trunk = tdcr.Robot(bone, [tdcr.Tendon(2.1 * k, 0.008, end=end) for k, end in enumerate(ends)])
+    around = {"obstacles": BAR, "loads": tdcr.Loads(disk_mass=0.0003, tip_force=(0.02, 0, 0.01))}
+    for target in tips(trunk, 25, **around)[:, :3, 3]:
+        answer = tdcr.inverse(trunk, target, **around).require()
+        assert answer.message == ""
+        shape = tdcr.forward(trunk, answer.displacements, **around).require()
+        np.testing.assert_allclose(shape.positions[-1], target, rtol=0, atol=1e-8)
+        # None hangs slack by more than a hair.
+        rest = tdcr.forward(trunk, tensions=np.zeros(9)).tendon_lengths
+        slack = rest + answer.displacements - answer.shape.tendon_lengths
+        assert np.abs(slack).max() < 2e-9
+
+
+def test_long_tools_do_not_look_like_other_shapes():
+    tool = np.eye(4)
+    tool[2, 3] = 1000.0
+    far = tdcr.Robot(STEEL, ROBOT.tendons, tool=tool)
+    target = (tdcr.forward(far, tensions=[3, 1, 0], obstacles=BAR).tip @ tool)[:3, 3]
+    answer = tdcr.inverse(far, target, obstacles=BAR).require()
+    assert answer.message == ""
+
+
+def test_a_robot_that_rests_in_an_obstacle_is_led_out_by_its_tendons():
+    box = tdcr.Box((0.005, 0.001, 0.064), (0.006, 0.006, 0.006))
+    assert not tdcr.forward(ROBOT, tensions=[0, 0, 0], obstacles=box).ok
+    target = tdcr.forward(ROBOT, tensions=[0, 6, 1], obstacles=box).require().positions[-1]
+    answer = tdcr.inverse(ROBOT, target, obstacles=box).require()
+    shape = tdcr.forward(ROBOT, answer.displacements, obstacles=box).require()
+    np.testing.assert_allclose(shape.positions[-1], target, rtol=0, atol=1e-8)
+
+
+def test_no_shape_at_all_is_told():
+    ball = tdcr.Sphere((0, 0, 0), 0.02)
+    search = tdcr.InverseSettings(starts=4)
+    answer = tdcr.inverse(ROBOT, [0, 0.05, 0.15], obstacles=ball, search=search)
+    assert answer.status is Status.infeasible
+    assert answer.message.startswith("none of 4 starts leads to a shape of the robot; without")
+    assert "deep in obstacles[0] at disk 1" in answer.message
+    assert np.isnan(answer.error)
+    rows = tdcr.inverse_batch(ROBOT, [[0, 0.05, 0.15]], obstacles=ball, search=search)
+    assert rows[0].message == "row 0: no shape was found among the obstacles"
+    places = tdcr.inverse(ROBOT, positions=np.ones((18, 3)), obstacles=ball, search=search)
+    assert places.message == answer.message
+
+
+LONG = """
+    import numpy as np, tdcr
+    steel = tdcr.Backbone([0.06] * 3, [90] * 3, youngs_modulus=200e9, diameter=0.001)
+    ends = [90 * (k // 3 + 1) for k in range(9)]
+    robot = tdcr.Robot(steel, [tdcr.Tendon(2.1 * k, 0.008, end=e) for k, e in enumerate(ends)])
+    bar = tdcr.Cylinder(point=(-0.03, 0, 0.1), axis=(0, 1, 0), radius=0.015)
+    far = np.full((3000, 3), 0.2)
+    starts = np.where(np.arange(9) % 3 == 0, -0.004, np.inf) * np.ones((3000, 1))
+    way = np.linspace([0, 0.02, 0.17], [0.2, 0.2, 0.2], 3000)
+    places = np.full((270, 3), 0.06)
+"""
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "tdcr.inverse(robot, far[0], obstacles=bar)",
+        "tdcr.inverse(robot, far[0], obstacles=bar, method='pso')",
+        "tdcr.inverse_batch(robot, far, obstacles=bar)",
+        "tdcr.inverse_batch(robot, far, start=starts, obstacles=bar)",
+        "tdcr.inverse_batch(robot, far * 0.1, start=starts)",
+        "tdcr.track(robot, way, obstacles=bar)",
+        "tdcr.inverse(robot, positions=places, obstacles=bar)",
+    ],
+)
+def test_an_interrupt_ends_long_searches(call):
+    assert_interrupts(LONG, call)

@@ -9,7 +9,8 @@ use tdcr::Status;
 use tdcr::batch::{Control, pool};
 use tdcr::constant_curvature::{Arc, displacements};
 use tdcr::inverse::{
-    Bounds, ConstantCurvatureInverse, InverseSettings, Target, invert_path, invert_rows,
+    Bounds, ConstantCurvatureInverse, InverseSettings, Inverter as _, Target, invert_path,
+    invert_rows,
 };
 
 use crate::inverse_common::{
@@ -218,12 +219,17 @@ fn batches_equal_single_solves_on_any_number_of_threads() {
                 if i % 3 == 0 { Target::Position(pose.translation) } else { Target::frame(&pose) }
             })
             .collect();
-        let begin: Vec<Vec<Arc>> = (0..301).map(|_| arcs(&LENGTHS, extensible, &mut u)).collect();
-        for starts in [&[][..], &begin] {
+        let mut begin = Vec::new();
+        for _ in 0..301 {
+            let made = displacements(&plan, &arcs(&LENGTHS, extensible, &mut u));
+            begin.extend_from_slice(made.as_slice());
+        }
+        for starts in [&[][..], &begin[..9], &begin] {
             let solve = |threads| {
                 let control = Control::default();
                 let pool = pool(Some(threads)).unwrap();
-                let rows = invert_rows(&inverse, &targets, starts, &pool, &control).unwrap();
+                let rows = invert_rows(&inverse, &targets, starts, &pool, &control);
+                let rows = rows.unwrap().unwrap();
                 assert_eq!(control.done.load(Ordering::Relaxed), 301);
                 rows
             };
@@ -233,8 +239,10 @@ fn batches_equal_single_solves_on_any_number_of_threads() {
             let mut place = vec![0.0; 9];
             for (i, target) in targets.iter().enumerate() {
                 let mut work = inverse.workspace();
-                let start = starts.get(i).map(Vec::as_slice);
-                assert_eq!(inverse.solve(target, start, &mut work), one.answers[i]);
+                let row = if starts.len() == 9 { 0 } else { i };
+                let start = starts.chunks_exact(9).nth(row);
+                let start = start.map(|own| inverse.start(own, None).unwrap());
+                assert_eq!(inverse.solve(target, start.as_deref(), &mut work), one.answers[i]);
                 inverse.write_displacements(&work, &mut place);
                 assert_eq!(place, one.displacements[9 * i..9 * (i + 1)]);
                 let made = displacements(&plan, &inverse.arcs(&work));
@@ -245,15 +253,22 @@ fn batches_equal_single_solves_on_any_number_of_threads() {
             let other = InverseSettings { seed: 8, ..settings };
             let other = ConstantCurvatureInverse::new(&robot, &plan, &bounds, other).unwrap();
             let pool = pool(Some(2)).unwrap();
-            let rows = invert_rows(&other, &targets, starts, &pool, &Control::default()).unwrap();
-            assert_ne!(rows.displacements, one.displacements);
+            let rows = invert_rows(&other, &targets, starts, &pool, &Control::default());
+            assert_ne!(rows.unwrap().unwrap().displacements, one.displacements);
         }
         let control = Control::default();
         control.stop.store(true, Ordering::Relaxed);
-        assert!(invert_rows(&inverse, &targets, &[], &pool(Some(2)).unwrap(), &control).is_none());
-        assert!(invert_path(&inverse, &targets, None, &control).is_none());
-        let none = invert_rows(&inverse, &[], &[], &pool(Some(2)).unwrap(), &Control::default());
+        let pool = pool(Some(2)).unwrap();
+        assert!(invert_rows(&inverse, &targets, &[], &pool, &control).unwrap().is_none());
+        assert!(invert_path(&inverse, &targets, None, &control).unwrap().is_none());
+        let go = Control::default();
+        let none = invert_rows(&inverse, &[], &[], &pool, &go).unwrap();
         assert!(none.unwrap().answers.is_empty());
+        begin[9] = f64::NAN;
+        let error = invert_rows(&inverse, &targets, &begin, &pool, &go).unwrap_err();
+        assert_eq!(error.argument, "start[1]");
+        let error = invert_path(&inverse, &targets, Some(&begin[9..18]), &go).unwrap_err();
+        assert_eq!(error.argument, "start");
     }
 }
 
@@ -282,10 +297,11 @@ fn paths_are_followed_smoothly() {
                 if posed { Target::frame(&pose) } else { Target::Position(pose.translation) }
             })
             .collect();
-        let start = along(0, extensible);
+        let start = displacements(&plan, &along(0, extensible));
         let control = Control::default();
         let begin = Instant::now();
-        let rows = invert_path(&inverse, &targets, Some(&start), &control).unwrap();
+        let rows = invert_path(&inverse, &targets, Some(start.as_slice()), &control);
+        let rows = rows.unwrap().unwrap();
         let micros = 1e3 * begin.elapsed().as_secs_f64();
         assert_eq!(control.done.load(Ordering::Relaxed), 1000);
         let (mut most, mut step, mut made) = (0, 0.0_f64, 0.0_f64);

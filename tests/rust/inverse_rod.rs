@@ -230,7 +230,7 @@ fn a_helix_is_tracked_without_jumps() {
             })
             .collect();
         let clock = Instant::now();
-        let rows = invert_path(&inverse, &targets, None, &Control::default()).unwrap();
+        let rows = invert_path(&inverse, &targets, None, &Control::default()).unwrap().unwrap();
         let each = clock.elapsed().as_secs_f64() * 1e3;
         let mut jump = 0.0_f64;
         for (i, answer) in rows.answers.iter().enumerate() {
@@ -389,7 +389,7 @@ fn freedom_goes_to_the_least_tensions() {
             let lowest = sum(&least, &work);
             assert!(lowest <= made.iter().map(|t| t * t).sum::<f64>() * (1.0 + 1e-9));
             // From there again: the least does not depend on how near the start is.
-            let start = least.start(&displacements).unwrap();
+            let start = least.start(&displacements, None).unwrap();
             assert_eq!(any.solve(&target, Some(&start), &mut other).status, Status::Converged);
             assert!(lowest <= sum(&any, &other) * (1.0 + 1e-9));
             // Steps that the target allows change the sum by second order at most.

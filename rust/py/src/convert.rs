@@ -65,7 +65,7 @@ pub(crate) fn type_name(value: &Bound<'_, PyAny>) -> String {
     name.unwrap_or_else(|_| "another type".to_owned())
 }
 
-/// An array of numbers of any shape as C-order float64.
+/// An array of numbers of any shape as C-order, aligned float64: itself, or a copy of one that is not.
 ///
 /// Text and objects are a `TypeError`; what has no rectangular shape is `InvalidInput`.
 pub(crate) fn float_array<'py>(
@@ -73,6 +73,7 @@ pub(crate) fn float_array<'py>(
     value: &Bound<'py, PyAny>,
 ) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     if let Ok(array) = value.extract::<PyReadonlyArrayDyn<'py, f64>>()
+        && array.as_slice().is_ok()
         && array.is_c_contiguous()
     {
         return Ok(array);
@@ -96,7 +97,13 @@ pub(crate) fn float_array<'py>(
     let float = numpy.call_method1("ascontiguousarray", (&array, "float64"))?;
     // ascontiguousarray makes a 0-d array 1-d; shapes are checked on the original.
     let shape = array.getattr("shape")?;
-    float.call_method1("reshape", (shape,))?.extract()
+    aligned(float.call_method1("reshape", (shape,))?)?.extract()
+}
+
+/// An array whose numbers are where the processor wants them: a copy of one from a packed record.
+pub(crate) fn aligned(array: Bound<'_, PyAny>) -> PyResult<Bound<'_, PyAny>> {
+    let sound = array.getattr("flags")?.getattr("aligned")?.extract()?;
+    if sound { Ok(array) } else { array.call_method0("copy") }
 }
 
 /// The values of a C-order array.

@@ -1,6 +1,7 @@
 //! The engines of `inverse`, `inverse_batch`, `track` and `inverse_solutions`; their docstrings are in
 //! Python.
 
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use nalgebra::{Matrix4, Vector3};
@@ -161,44 +162,51 @@ impl<'a> Plans<'a> {
     }
 }
 
-/// A start from displacements.
-fn begin<I: Inverter>(inverse: &I, argument: &str, displacements: &[f64]) -> PyResult<I::Start> {
-    inverse
-        .start(displacements)
-        .map_err(|error| invalid(&InvalidInput { argument: argument.to_owned(), ..error }))
+/// Refuses targets that are too far away.
+fn check_targets<I: Inverter>(inverse: &I, targets: &[Target]) -> PyResult<()> {
+    for (row, target) in targets.iter().enumerate() {
+        inverse.check_target(target).map_err(|error| {
+            let got = format!("{} in row {row}", error.got);
+            invalid(&InvalidInput { argument: "targets".to_owned(), got, ..error })
+        })?;
+    }
+    Ok(())
 }
 
-fn one_start<I: Inverter>(
-    inverse: &I,
+/// Displacements of a start.
+fn one_start(
+    robot: &tdcr::robot::Robot,
     value: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Option<I::Start>> {
+) -> PyResult<Option<Vec<f64>>> {
     let Some(value) = value else { return Ok(None) };
     let array = float_array("start", value)?;
-    let tendons = inverse.robot().tendons().len();
+    let tendons = robot.tendons().len();
     if array.shape() != [tendons] {
         let expected = format!("displacements of shape ({tendons},)");
         return Err(wrong_shape("start", &expected, array.shape()));
     }
-    begin(inverse, "start", values(&array)?).map(Some)
+    Ok(Some(values(&array)?.to_vec()))
 }
 
-fn many_starts<I: Inverter>(
-    inverse: &I,
+/// Displacements of a start of all rows, or of one for each.
+fn many_starts(
+    robot: &tdcr::robot::Robot,
     rows: usize,
     value: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Vec<I::Start>> {
+) -> PyResult<Vec<f64>> {
     let Some(value) = value else { return Ok(Vec::new()) };
     let array = float_array("start", value)?;
-    let tendons = inverse.robot().tendons().len();
-    if array.shape() == [tendons] {
-        return Ok(vec![begin(inverse, "start", values(&array)?)?; rows]);
-    }
-    if array.shape() != [rows, tendons] {
+    let tendons = robot.tendons().len();
+    if array.shape() != [tendons] && array.shape() != [rows, tendons] {
         let expected = format!("displacements of shape ({tendons},) or ({rows}, {tendons})");
         return Err(wrong_shape("start", &expected, array.shape()));
     }
-    let given = values(&array)?.chunks_exact(tendons.max(1)).enumerate();
-    given.map(|(row, d)| begin(inverse, &format!("start[{row}]"), d)).collect()
+    Ok(values(&array)?.to_vec())
+}
+
+/// Errors of a start that is solved for name it.
+fn of_start(error: InvalidInput) -> InvalidInput {
+    InvalidInput { argument: "start".to_owned(), ..error }
 }
 
 /// (displacements, tensions, status, message, error, `rotation_error`, iterations, starts)
@@ -332,9 +340,11 @@ pub(crate) fn _inverse_places(
     let engine = plans.engine(robot, bounds, search, method)?;
     let Engine::Rod(inverse) = &engine else { return Err(rod_only("positions", model)) };
     let places = wanted_places(&robot.get().0, positions)?;
-    let start = one_start(&**inverse, start)?;
+    let start = one_start(inverse.robot(), start)?;
     let found = long_call::run(py, None, |control| {
         around.stopped_by(&control.stop);
+        let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
+        let start = start.map(begin).transpose()?;
         inverse.solve_places(&places, start.as_ref(), Some(&control.stop))
     })?;
     checked(py, Mutex::new(inverse.take_fault()))?;
@@ -354,27 +364,29 @@ fn invert_one<I: Inverter>(
     start: Option<&Bound<'_, PyAny>>,
     around: &Surroundings,
     soon: bool,
-) -> PyResult<Found>
-where
-    I::Start: Send,
-{
-    let start = one_start(inverse, start)?;
-    let solve = |mut work: I::Work<'_>| {
+) -> PyResult<Found> {
+    inverse.check_target(target).map_err(|e| invalid(&e))?;
+    let start = one_start(inverse.robot(), start)?;
+    let solve = |stop: Option<&Arc<AtomicBool>>| {
+        let start = start.map(|own| inverse.start(&own, stop).map_err(of_start)).transpose()?;
+        let mut work = inverse.buffers(stop.map(AsRef::as_ref));
         let answer = inverse.solve(target, start.as_ref(), &mut work);
         let mut displacements = vec![f64::NAN; inverse.robot().tendons().len()];
         let mut tensions = displacements.clone();
         inverse.write_displacements(&work, &mut displacements);
         inverse.write_tensions(&work, &mut tensions);
         let message = inverse.message(&answer, &work);
-        ((displacements, tensions, answer, message), inverse.state(&mut work))
+        Ok(((displacements, tensions, answer, message), inverse.state(&mut work)))
     };
-    if soon {
-        return Ok(py.detach(|| solve(inverse.buffers(None))));
-    }
-    long_call::run(py, None, |control| {
-        around.stopped_by(&control.stop);
-        solve(inverse.buffers(Some(&control.stop)))
-    })
+    let found = if soon {
+        py.detach(|| solve(None))
+    } else {
+        long_call::run(py, None, |control| {
+            around.stopped_by(&control.stop);
+            solve(Some(&control.stop))
+        })?
+    };
+    found.map_err(|e| invalid(&e))
 }
 
 /// All answers of one target, least bending energy first, each with the number of starts that led there.
@@ -398,6 +410,7 @@ pub(crate) fn _inverse_solutions(
         return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
     };
     let target = one_target(target)?;
+    inverse.check_target(&target).map_err(|e| invalid(&e))?;
     let solutions = long_call::run(py, None, |control| {
         inverse.solutions_in(&target, &mut inverse.workspace().stopped_by(&control.stop))
     })?;
@@ -464,23 +477,22 @@ fn invert_many<'py, I: Inverter>(
     pool: Option<&ThreadPool>,
     progress: Option<&Bound<'py, PyAny>>,
     around: &Surroundings,
-) -> PyResult<Bound<'py, PyDict>>
-where
-    I::Start: Send,
-{
+) -> PyResult<Bound<'py, PyDict>> {
+    check_targets(inverse, targets)?;
     let answers = if let Some(pool) = pool {
-        let starts = many_starts(inverse, targets.len(), start)?;
+        let starts = many_starts(inverse.robot(), targets.len(), start)?;
         long_call::run(py, progress, |control| {
             around.stopped_by(&control.stop);
             invert_rows(inverse, targets, &starts, pool, control)
         })?
     } else {
-        let start = one_start(inverse, start)?;
+        let start = one_start(inverse.robot(), start)?;
         long_call::run(py, progress, |control| {
             around.stopped_by(&control.stop);
-            invert_path(inverse, targets, start.as_ref(), control)
+            invert_path(inverse, targets, start.as_deref(), control)
         })?
     };
+    let answers = answers.map_err(|e| invalid(&e))?;
     // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
     export(py, answers.unwrap_or_default(), inverse.robot().tendons().len())
 }

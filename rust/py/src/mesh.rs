@@ -8,7 +8,9 @@ use pyo3::types::{PyDict, PyTuple, PyType};
 use tdcr::InvalidInput;
 use tdcr::obstacle as core;
 
-use crate::convert::{Lazy, frozen, frozen_points, invalid, type_name, vectors, wrong_shape};
+use crate::convert::{
+    Lazy, aligned, frozen, frozen_points, invalid, type_name, vectors, wrong_shape,
+};
 use crate::obstacle::Obstacle;
 
 /// The inside of a closed surface of triangles.
@@ -63,7 +65,7 @@ fn triangles(value: &Bound<'_, PyAny>) -> PyResult<Vec<[usize; 3]>> {
         return Err(PyTypeError::new_err(message));
     }
     let array = numpy.call_method1("ascontiguousarray", (array, "int64"))?;
-    let array: PyReadonlyArrayDyn<'_, i64> = array.extract()?;
+    let array: PyReadonlyArrayDyn<'_, i64> = aligned(array)?.extract()?;
     let number = |index: &i64| {
         let refuse = || InvalidInput::new("faces", "vertex numbers of 0 or more", index);
         usize::try_from(*index).map_err(|_| invalid(&refuse()))

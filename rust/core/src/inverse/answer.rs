@@ -10,7 +10,8 @@ use crate::status::Status;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Converged: the target is met, with the least bending energy nearby where there is freedom.
-    /// Unreachable: the nearest pose that the starts led to. Infeasible: the bounds exclude each other.
+    /// Unreachable: the nearest pose that the starts led to. Infeasible: the bounds exclude each
+    /// other, or, where distance and angle are NaN, no shape of the robot was found at all.
     pub status: Status,
     /// Distance from the tool to the target over the axes that count \[m\].
     pub distance: f64,
@@ -26,6 +27,11 @@ impl Answer {
     pub(super) fn of(found: Found, (distance, angle): (f64, f64)) -> Self {
         let Found { status, iterations, starts } = found;
         Self { status, distance, angle, iterations, starts }
+    }
+
+    /// Of a robot of which no shape was found.
+    pub(super) fn shapeless(found: Found) -> Self {
+        Self::of(Found { status: Status::Infeasible, ..found }, (f64::NAN, f64::NAN))
     }
 
     /// Of a target that was not sought.

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
-use std::sync::atomic::AtomicBool;
+use std::sync::{self, atomic::AtomicBool};
 
 use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -366,7 +366,11 @@ impl Inverter for ConstantCurvatureInverse<'_> {
         &self.settings
     }
 
-    fn start(&self, displacements: &[f64]) -> Result<Vec<Arc>, InvalidInput> {
+    fn start(
+        &self,
+        displacements: &[f64],
+        _stop: Option<&sync::Arc<AtomicBool>>,
+    ) -> Result<Vec<Arc>, InvalidInput> {
         self.robot.check_displacements(displacements)?;
         let mut work = constant_curvature::Workspace::default();
         ConstantCurvature::new(self.robot, &self.plan).solve(displacements, &mut work)?;

@@ -44,6 +44,8 @@ pub(super) struct Pull<'a, G = ToolGoal<'a>> {
     /// Length of every tendon at rest, which violations are measured by \[m\].
     lengths: &'a [f64],
     bounded: bool,
+    /// What tendons without tension are let out by, so that rounding does not lock those that depend on each other \[m\].
+    pub(super) hair: f64,
     tensions: Vec<f64>,
     /// The point evaluated last is a balance.
     sound: bool,
@@ -54,6 +56,8 @@ pub(super) struct Pull<'a, G = ToolGoal<'a>> {
 const PRECISION: f64 = 1e-6;
 /// Place of the balance nearest to what is wanted, among those that are kept.
 const NEAREST: usize = 2;
+/// A tendon pulls no more than this: it has no tension \[rad\].
+const SLACK: f64 = 1e-9;
 
 impl<'a, G> Pull<'a, G> {
     pub(super) fn new(
@@ -71,6 +75,7 @@ impl<'a, G> Pull<'a, G> {
             ranges,
             lengths,
             bounded: ranges.iter().any(finite),
+            hair: 0.0,
             tensions: Vec::new(),
             sound: false,
             second: Vec::new(),
@@ -102,8 +107,17 @@ impl<'a, G> Pull<'a, G> {
     /// Displacements at hand \[m\]; rounding leaves none outside its bounds.
     pub(super) fn write_displacements(&self, place: &mut [f64]) {
         for (k, (displacement, (lower, upper))) in place.iter_mut().zip(self.ranges).enumerate() {
-            *displacement = self.rod.displacement(k).max(*lower).min(*upper);
+            // Where an obstacle's function failed before the first balance there are none.
+            let own = self.rod.tensions().get(k);
+            let slack = own.is_some_and(|tension| *tension <= SLACK * self.units[k]);
+            let hair = if slack { self.hair } else { 0.0 };
+            *displacement = (self.rod.displacement(k) + hair).max(*lower).min(*upper);
         }
+    }
+
+    /// Whether the point evaluated last is a balance.
+    pub(super) fn sound(&self) -> bool {
+        self.sound
     }
 
     /// Forgets the point evaluated last: the rod is put elsewhere.

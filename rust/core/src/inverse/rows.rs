@@ -1,7 +1,9 @@
 //! Many targets on all cores, and paths.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use nalgebra::Vector3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -47,11 +49,23 @@ pub trait Inverter: Sync {
     /// The choices it was prepared with.
     fn settings(&self) -> &InverseSettings;
 
-    /// Where a solve starts from displacements.
+    /// Checks that a target is near enough to be told from its neighbours.
+    ///
+    /// # Errors
+    /// `InvalidInput` for one that is further from the base than a million times the robot's length and its tool's.
+    fn check_target(&self, target: &Target) -> Result<(), InvalidInput> {
+        near_enough("target", self.robot(), &target.position())
+    }
+
+    /// Where a solve starts from displacements; what that takes ends soon after the flag is set, if there is one.
     ///
     /// # Errors
     /// `InvalidInput` for displacements that do not fit the robot.
-    fn start(&self, displacements: &[f64]) -> Result<Self::Start, InvalidInput>;
+    fn start(
+        &self,
+        displacements: &[f64],
+        stop: Option<&Arc<AtomicBool>>,
+    ) -> Result<Self::Start, InvalidInput>;
 
     /// Buffers for this inverse; solves end before their next start when the flag is set, if there is one.
     fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Self::Work<'w>;
@@ -82,64 +96,114 @@ pub trait Inverter: Sync {
     fn message(&self, answer: &Answer, work: &Self::Work<'_>) -> String;
 }
 
-/// Solves every target on `pool`, each as alone, from `starts` (one per row, or none). Returns `None` when it was
-/// stopped.
-#[must_use]
+/// Targets are no further from the base than so many lengths of the robot and its tool: rounding would decide.
+const FARTHEST: f64 = 1e6;
+
+/// Checks a wanted place.
+///
+/// # Errors
+/// `InvalidInput` for one that is too far from the base.
+pub(super) fn near_enough(
+    argument: &str,
+    robot: &Robot,
+    place: &Vector3<f64>,
+) -> Result<(), InvalidInput> {
+    let far = FARTHEST * (robot.backbone().total_length() + robot.tool().translation.norm());
+    if (place - robot.base().translation).norm() <= far {
+        return Ok(());
+    }
+    let expected = format!(
+        "a place within {far:.3e} m of the base, {FARTHEST:.0e} times the robot's length and its tool's"
+    );
+    Err(InvalidInput::new(argument, expected, format!("{:?}", place.as_slice())))
+}
+
+/// Checks displacements to start from, one row of every tendon's after the other.
+///
+/// # Errors
+/// `InvalidInput` that names the row, if there are several.
+fn check_starts(robot: &Robot, starts: &[f64]) -> Result<(), InvalidInput> {
+    let count = robot.tendons().len().max(1);
+    for (row, own) in starts.chunks(count).enumerate() {
+        robot.check_displacements(own).map_err(|error| {
+            let one = starts.len() == count;
+            let argument = if one { "start".to_owned() } else { format!("start[{row}]") };
+            InvalidInput { argument, ..error }
+        })?;
+    }
+    Ok(())
+}
+
+/// Solves every target on `pool`, each as alone, from displacements (`starts`: one row for all targets, one per
+/// target, or none \[m\]). Returns `None` when it was stopped.
+///
+/// # Errors
+/// `InvalidInput` for starts that do not fit the robot, naming the row.
 pub fn invert_rows<I: Inverter>(
     inverse: &I,
     targets: &[Target],
-    starts: &[I::Start],
+    starts: &[f64],
     pool: &ThreadPool,
     control: &Control,
-) -> Option<InverseRows> {
+) -> Result<Option<InverseRows>, InvalidInput> {
+    check_starts(inverse.robot(), starts)?;
     let count = inverse.robot().tendons().len();
     let mut rows = InverseRows::blank(targets.len(), count);
     let InverseRows { displacements, tensions, answers } = &mut rows;
     let width = (ROWS_PER_JOB * count).max(1);
+    let begin = |own: &[f64]| inverse.start(own, Some(&control.stop));
     pool.install(|| {
+        let all =
+            (!starts.is_empty() && starts.len() == count).then(|| begin(starts)).transpose()?;
         (targets.par_chunks(ROWS_PER_JOB))
             .zip(answers.par_chunks_mut(ROWS_PER_JOB))
             .zip(displacements.par_chunks_mut(width))
             .zip(tensions.par_chunks_mut(width))
             .enumerate()
-            .for_each_init(
+            .try_for_each_init(
                 || inverse.buffers(Some(&control.stop)),
                 |work, (job, (((targets, answers), displacements), tensions))| {
                     for (i, (target, answer)) in targets.iter().zip(answers).enumerate() {
                         if control.stop.load(Ordering::Relaxed) {
-                            return;
+                            return Ok(());
                         }
-                        let start = starts.get(ROWS_PER_JOB * job + i);
-                        *answer = inverse.solve(target, start, work);
+                        let each = starts.chunks_exact(count.max(1)).nth(ROWS_PER_JOB * job + i);
+                        let each = each.filter(|_| all.is_none()).map(begin).transpose()?;
+                        *answer = inverse.solve(target, each.as_ref().or(all.as_ref()), work);
                         let own = i * count..(i + 1) * count;
                         inverse.write_displacements(work, &mut displacements[own.clone()]);
                         inverse.write_tensions(work, &mut tensions[own]);
                         control.done.fetch_add(1, Ordering::Relaxed);
                     }
+                    Ok(())
                 },
-            );
-    });
-    (!control.stop.load(Ordering::Relaxed)).then_some(rows)
+            )
+    })?;
+    Ok((!control.stop.load(Ordering::Relaxed)).then_some(rows))
 }
 
-/// Solves targets one after the other, each from the answer of the one before. Returns `None` when it was
-/// stopped.
-#[must_use]
+/// Solves targets one after the other, each from the answer of the one before, the first from displacements, if
+/// given \[m\]. Returns `None` when it was stopped.
+///
+/// # Errors
+/// `InvalidInput` for a start that does not fit the robot.
 pub fn invert_path<I: Inverter>(
     inverse: &I,
     targets: &[Target],
-    start: Option<&I::Start>,
+    start: Option<&[f64]>,
     control: &Control,
-) -> Option<InverseRows> {
+) -> Result<Option<InverseRows>, InvalidInput> {
+    check_starts(inverse.robot(), start.unwrap_or_default())?;
+    let start = start.map(|own| inverse.start(own, Some(&control.stop))).transpose()?;
     let count = inverse.robot().tendons().len();
     let mut rows = InverseRows::blank(targets.len(), count);
     let mut work = inverse.buffers(Some(&control.stop));
     for (i, target) in targets.iter().enumerate() {
         if control.stop.load(Ordering::Relaxed) {
-            return None;
+            return Ok(None);
         }
         rows.answers[i] = if i == 0 {
-            inverse.solve(target, start, &mut work)
+            inverse.solve(target, start.as_ref(), &mut work)
         } else {
             inverse.follow(target, &mut work)
         };
@@ -148,5 +212,5 @@ pub fn invert_path<I: Inverter>(
         inverse.write_tensions(&work, &mut rows.tensions[own]);
         control.done.fetch_add(1, Ordering::Relaxed);
     }
-    Some(rows)
+    Ok(Some(rows))
 }

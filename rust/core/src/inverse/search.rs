@@ -93,6 +93,7 @@ impl<const R: usize> Search<'_, R> {
     ) -> (Status, usize) {
         self.fit.iterations = 0;
         self.candidates.clear();
+        let mut descended = false;
         for tried in 0..effort.starts {
             if tried > 0 && self.stopped() {
                 return (Status::IterationLimit, tried);
@@ -114,12 +115,13 @@ impl<const R: usize> Search<'_, R> {
                 }
                 continue;
             }
+            descended = true;
             if let Some(status) = self.descend(problem, space, effort) {
                 return (status, tried + 1);
             }
         }
-        // A swarm looks where the starts did not.
-        if effort.fall_back {
+        // A swarm looks where the starts did not, unless none of them had a value at all.
+        if effort.fall_back && !(descended && self.candidates.is_empty()) {
             problem.restart();
             if self.settle(problem, space, effort.swarm, 0)
                 && let Some(status) = self.descend(problem, space, effort)

@@ -1,5 +1,6 @@
 //! The inverse of the strain-energy rod.
 
+mod ending;
 mod path;
 mod rise;
 mod shape;
@@ -17,7 +18,7 @@ use super::bounds::{Bounds, Space};
 use super::constant_curvature::{self, ConstantCurvatureInverse};
 use super::pull::Pull;
 use super::rows::Inverter;
-use super::search::{Effort, Found, Freedom, Search};
+use super::search::{Effort, Freedom, Search};
 use super::tool::ToolGoal;
 use super::{InverseSettings, Method, Target};
 use crate::error::InvalidInput;
@@ -28,9 +29,9 @@ use crate::rod::balance::Balance;
 use crate::rod::contact::{self, Leaning, LoadedRod, Scene};
 use crate::rod::pulled::Pulled;
 use crate::rod::{self, Plan, Rod, TendonRule};
-use crate::solve::fit::Problem;
 use crate::solve::region::Region;
 use crate::status::Status;
+use ending::ended;
 use rise::Rise;
 pub use shape::Placed;
 
@@ -81,8 +82,7 @@ const WIDEST: f64 = 4.0;
 const LEVER: f64 = 1e-3;
 /// Starts among obstacles and under loads at most: each takes ten times as long.
 const LOADED: usize = 50;
-/// A bound that is this near holds back \[rad, m\].
-const AT_EDGE: f64 = 1e-9;
+
 impl<'a> RodInverse<'a> {
     /// Prepares a robot; the plan must be of this robot.
     ///
@@ -168,20 +168,8 @@ impl<'a> RodInverse<'a> {
         }
     }
 
-    fn rise(&self) -> Option<Rise<'_>> {
-        self.loaded.as_ref().map(|rod| Rise::new(rod, self.robot))
-    }
-
-    /// Bounds that hold a point back.
-    fn held<G>(&self, point: &[f64], pull: &Pull<'_, G>) -> Vec<String> {
-        let names = self.robot.tendon_names();
-        let (edges, _) = self.space.region.at_edge(point, AT_EDGE);
-        let labels = edges.iter().map(|k| self.labels[*k].clone());
-        let mut held: Vec<String> = labels.filter(|label| !label.is_empty()).collect();
-        held.extend(pull.holding(AT_EDGE).into_iter().map(|(k, release)| {
-            format!("{} of '{}'", if release { "release" } else { "pull" }, names[k])
-        }));
-        held
+    fn rise<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Option<Rise<'w>> {
+        self.loaded.as_ref().map(|rod| Rise::new(rod, self.robot, stop))
     }
 
     fn write_tensions_of(&self, rod: &dyn Balance, place: &mut [f64]) {
@@ -235,16 +223,12 @@ impl<'a> RodInverse<'a> {
                 self.begin(target, k - before, guess.as_mut(), bends, point);
             }
         };
-        let mut found = match &mut work.rise {
+        let found = match &mut work.rise {
             Some(rise) => rise.search(pull, search, &self.space, effort, start),
             None => search.run(pull, &self.space, effort, start),
         };
-        if found.status == Status::NumericalError && pull.violation() > 0.0 {
-            // No start could be brought inside.
-            found.status = Status::Infeasible;
-        }
         *met = found.status == Status::Converged;
-        answer(found, pull, search)
+        ended(found, pull, search, |goal| goal.aim.misses())
     }
 
     fn effort(&self, starts: usize) -> Effort<'_> {
@@ -285,14 +269,21 @@ impl Inverter for RodInverse<'_> {
         &self.settings
     }
 
-    fn start(&self, displacements: &[f64]) -> Result<State, InvalidInput> {
+    fn start(
+        &self,
+        displacements: &[f64],
+        stop: Option<&Arc<AtomicBool>>,
+    ) -> Result<State, InvalidInput> {
         self.robot.check_displacements(displacements)?;
         if let Some(rod) = &self.loaded {
             let mut work = contact::Workspace::default();
-            rod.solve(displacements, &mut work)?;
+            rod.lead(displacements, &mut work, stop.map(AsRef::as_ref));
             return Ok(rod.take_state(work));
         }
-        let (rod, mut work) = (self.rest.rod(), rod::Workspace::default());
+        let (mut rod, mut work) = (self.rest.rod().clone(), rod::Workspace::default());
+        if let Some(stop) = stop {
+            rod = rod.stopped_by(Arc::clone(stop));
+        }
         rod.solve(displacements, &mut work)?;
         Ok(rod.take_state(work))
     }
@@ -312,7 +303,7 @@ impl Inverter for RodInverse<'_> {
             bends: Vec::new(),
             met: false,
             before: None,
-            rise: self.rise(),
+            rise: self.rise(stop),
         }
     }
 
@@ -345,6 +336,9 @@ impl Inverter for RodInverse<'_> {
     }
 
     fn message(&self, answer: &Answer, work: &RodWorkspace<'_>) -> String {
+        if answer.status == Status::Infeasible {
+            return self.shapeless(answer);
+        }
         let held = self.held(&work.search.point, &work.pull);
         let told = tell(answer, &self.settings, &held, "tension");
         match &work.rise {
@@ -356,9 +350,4 @@ impl Inverter for RodInverse<'_> {
     fn write_displacements(&self, work: &RodWorkspace<'_>, place: &mut [f64]) {
         work.pull.write_displacements(place);
     }
-}
-
-fn answer(found: Found, pull: &mut Pull<'_>, search: &mut Search<'_>) -> Answer {
-    search.fit.evaluate(pull, &search.point);
-    Answer::of(found, pull.aim.aim.misses())
 }

@@ -1,6 +1,6 @@
 //! From target to target along a path.
 
-use super::{RodInverse, RodWorkspace, answer};
+use super::{RodInverse, RodWorkspace, ended};
 use crate::inverse::Target;
 use crate::inverse::answer::Answer;
 use crate::inverse::bounds::Space;
@@ -94,11 +94,14 @@ impl RodInverse<'_> {
             }
         }
         let found = Found { status: Status::Converged, iterations, starts: 1 };
-        Some(answer(found, &mut work.pull, &mut work.search))
+        Some(ended(found, &mut work.pull, &mut work.search, |goal| goal.aim.misses()))
     }
 
     /// From the row before, or from a few starts where that does not lead there.
     pub(super) fn go_on(&self, target: &Target, work: &mut RodWorkspace<'_>) -> Answer {
+        if let Some(rise) = &work.rise {
+            rise.slacken(&mut work.pull);
+        }
         let few = self.effort(self.settings.starts.min(FEW));
         if !work.met {
             let given = work.search.point.len() == self.units.len();

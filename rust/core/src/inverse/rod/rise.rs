@@ -1,21 +1,29 @@
 //! Whether the displacements of an answer lead to it from rest, where a robot has more than one shape.
 
-use crate::error::InvalidInput;
+use std::sync::atomic::AtomicBool;
+
 use crate::inverse::bounds::Space;
 use crate::inverse::pull::{Goal, Pull};
 use crate::inverse::search::{Effort, Found, Freedom, Search};
 use crate::lie::{Pose, so3};
-use crate::model::Model;
+use crate::model::Model as _;
 use crate::obstacle::Fault;
 use crate::robot::Robot;
 use crate::rod::contact::{LoadedRod, Workspace};
 use crate::status::Status;
 
-/// The tool comes back to where it was to this share of the robot's length, and to this angle \[rad\].
-const SAME: f64 = 1e-8;
+/// The tool comes back to where it was to this share of the robot's length and its tool's reach, and to this angle
+/// \[rad\].
+const SAME: (f64, f64) = (1e-8, 1e-8);
+/// The same shape within the precision of forward solves where all tendons of a segment pull and depend on each other;
+/// other shapes are further off.
+const ROUGHLY: (f64, f64) = (1e-6, 1e-5);
+/// Tendons without tension are let out by this share of the robot's length: as long as their way to the last bit, they
+/// and those that depend on them lock on the way from rest.
+const HAIR: f64 = 1e-8;
 /// So many answers that rest does not lead to, before one of them has to do.
 const TRIES: usize = 8;
-/// Places of an answer whatever its tensions, and of the first one that rest does not lead to.
+/// Places of an answer whatever its tensions, and of the first one, which has to do if rest leads to none.
 const MET: usize = 0;
 const FIRST: usize = 1;
 
@@ -25,13 +33,14 @@ pub(super) struct Rise<'a> {
     rod: LoadedRod<'a>,
     robot: &'a Robot,
     work: Workspace,
+    stop: Option<&'a AtomicBool>,
     /// Whether rest leads to the last answer.
     leads: bool,
 }
 
 impl<'a> Rise<'a> {
-    pub(super) fn new(rod: &LoadedRod<'a>, robot: &'a Robot) -> Self {
-        Self { rod: rod.clone(), robot, work: Workspace::default(), leads: true }
+    pub(super) fn new(rod: &LoadedRod<'a>, robot: &'a Robot, stop: Option<&'a AtomicBool>) -> Self {
+        Self { rod: rod.clone(), robot, work: Workspace::default(), stop, leads: true }
     }
 
     /// Searches on until rest leads to an answer, or for a few more answers; the first is kept otherwise.
@@ -50,7 +59,7 @@ impl<'a> Rise<'a> {
             return first;
         }
         pull.rod.keep(FIRST);
-        let first_point = search.point.clone();
+        let mut first_point = search.point.clone();
         let (mut found, mut iterations, mut starts) = (first, first.iterations, first.starts);
         for tried in 1..=TRIES {
             let point = search.point.clone();
@@ -59,12 +68,18 @@ impl<'a> Rise<'a> {
                 let lower = Effort { starts: 1, fall_back: false, nearest: false, ..effort };
                 let lower = search.run(pull, space, lower, |_, _| {});
                 iterations += lower.iterations;
-                if lower.status == Status::Converged && self.comes_to(pull).unwrap_or(false) {
-                    return Found { iterations, starts, ..found };
+                if lower.status == Status::Converged {
+                    if self.comes_to(pull) {
+                        return Found { iterations, starts, ..found };
+                    }
+                    if tried == 1 {
+                        pull.rod.keep(FIRST);
+                        first_point.clone_from(&search.point);
+                    }
                 }
                 back(pull, search, MET, &point);
             }
-            if self.comes_to(pull).unwrap_or(false) {
+            if self.comes_to(pull) {
                 return Found { iterations, starts, ..found };
             }
             if tried == TRIES || found.starts >= meet.starts || search.stopped() {
@@ -84,19 +99,37 @@ impl<'a> Rise<'a> {
         Found { iterations, starts, ..first }
     }
 
-    /// Whether the displacements at hand bring the tool to where it is.
-    fn comes_to<G>(&mut self, pull: &Pull<'_, G>) -> Result<bool, InvalidInput> {
+    /// Whether the displacements at hand bring the tool to where it is: with slack tendons let out by a hair, or without.
+    fn comes_to<G>(&mut self, pull: &mut Pull<'_, G>) -> bool {
+        self.slacken(pull);
+        if self.comes_within(SAME, pull) {
+            return true;
+        }
+        pull.hair = 0.0;
+        let comes = self.comes_within(ROUGHLY, pull);
+        if !comes {
+            self.slacken(pull);
+        }
+        comes
+    }
+
+    /// Lets tendons without tension out by a hair.
+    pub(super) fn slacken<G>(&self, pull: &mut Pull<'_, G>) {
+        pull.hair = HAIR * self.robot.backbone().total_length();
+    }
+
+    fn comes_within<G>(&mut self, (near, turn): (f64, f64), pull: &Pull<'_, G>) -> bool {
         let mut displacements = vec![0.0; self.robot.tendons().len()];
         pull.write_displacements(&mut displacements);
-        let report = self.rod.solve(&displacements, &mut self.work)?;
+        let report = self.rod.lead(&displacements, &mut self.work, self.stop);
         let base = self.robot.base();
         let tip = self.rod.state(&self.work).frames.last().copied();
         let tool = tip.unwrap_or_else(Pose::identity).compose(self.robot.tool());
         let wanted = base.compose(&pull.rod.motion().tool);
         let off = (tool.translation - wanted.translation).norm();
         let turned = so3::log(&tool.rotation.tr_mul(&wanted.rotation)).norm();
-        let near = SAME * self.robot.backbone().total_length();
-        Ok(report.status == Status::Converged && off <= near && turned <= SAME)
+        let reach = self.robot.backbone().total_length() + self.robot.tool().translation.norm();
+        report.status == Status::Converged && off <= near * reach && turned <= turn
     }
 
     /// What there is to say of an answer that meets its target.

@@ -4,16 +4,16 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::RodInverse;
+use super::{RodInverse, ended};
 use crate::error::InvalidInput;
 use crate::inverse::Target;
 use crate::inverse::answer::Answer;
 use crate::inverse::places::PlacesGoal;
 use crate::inverse::pull::Pull;
+use crate::inverse::rows::near_enough;
 use crate::inverse::search::{Effort, Freedom, Search};
 use crate::lie::{Pose, so3};
 use crate::model::State;
-use crate::solve::fit::Problem;
 use crate::status::Status;
 
 /// Starts at most: a sum of squares over the whole shape has few valleys.
@@ -43,8 +43,8 @@ impl RodInverse<'_> {
     /// sum of squared distances. First from a shape with its tensions, if given. Freedom that the places leave is not spent.
     ///
     /// # Errors
-    /// `InvalidInput` for another number of places than disks, none at all, one that is not finite, and more than 63
-    /// tendons.
+    /// `InvalidInput` for another number of places than disks, none at all, one that is not finite or further away than
+    /// a million lengths, and more than 63 tendons.
     pub fn solve_places(
         &self,
         places: &[Option<Vector3<f64>>],
@@ -61,6 +61,9 @@ impl RodInverse<'_> {
         }
         if places.iter().all(Option::is_none) {
             return Err(InvalidInput::new("positions", "the place of one disk at least", "none"));
+        }
+        for place in places.iter().flatten() {
+            near_enough("positions", self.robot, place)?;
         }
         match self.robot.tendons().len() {
             ..=7 => Ok(self.reach::<8>(places, start, stop)),
@@ -98,21 +101,18 @@ impl RodInverse<'_> {
         };
         let effort = Effort { freedom: Freedom::None, fall_back: false, ..self.effort(STARTS) };
         let effort = Effort { starts: effort.starts.min(self.settings.starts), ..effort };
-        let mut rise = self.rise();
-        let mut found = match &mut rise {
+        let mut rise = self.rise(stop);
+        let found = match &mut rise {
             Some(rise) => rise.search(&mut pull, &mut search, &self.space, effort, begin),
             None => search.run(&mut pull, &self.space, effort, begin),
         };
-        if found.status == Status::NumericalError && Problem::<R>::violation(&pull) > 0.0 {
-            found.status = Status::Infeasible;
-        }
-        search.fit.evaluate(&mut pull, &search.point);
-        self.note_fault(pull.rod.as_mut(), rise.as_mut());
+        let answer = ended(found, &mut pull, &mut search, |goal| (goal.misses().0, 0.0));
         let (most, mean, disk) = pull.aim.misses();
+        self.note_fault(pull.rod.as_mut(), rise.as_mut());
         let held = self.held(&search.point, &pull);
-        let message = match found.status {
+        let message = match answer.status {
             Status::Converged => rise.map_or("", |rise| rise.message()).to_owned(),
-            Status::Infeasible => "the bounds leave the robot no shape".to_owned(),
+            Status::Infeasible => self.shapeless(&answer),
             status => {
                 let how = if status == Status::Unreachable {
                     "the nearest shape"
@@ -132,7 +132,7 @@ impl RodInverse<'_> {
             }
         };
         let mut placed = Placed {
-            answer: Answer::of(found, (most, 0.0)),
+            answer,
             displacements: vec![0.0; self.units.len()],
             tensions: vec![0.0; self.units.len()],
             message,

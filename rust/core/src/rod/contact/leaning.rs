@@ -80,22 +80,21 @@ impl<'r> Leaning<'r> {
             motion: Motion::new(),
             grown: vec![Vec::new(); count],
         };
-        leaning.relax();
+        leaning.rest = leaning.set_out(&vec![0.0; count]);
         leaning.rest();
         leaning
     }
 
-    /// Finds the shape without tensions.
-    fn relax(&mut self) {
-        let tensions = vec![0.0; self.grown.len()];
+    /// Climbs from the undeformed robot, without loads; where that leads.
+    fn set_out(&mut self, tensions: &[f64]) -> Point {
         let Self { rod, work, .. } = self;
         work.fault = None;
         rod.begin(work);
         let mut budget = rod.plan().settings.max_iterations;
-        let given = Given::Tensions(tensions.clone());
+        let given = Given::Tensions(tensions.to_vec());
         let sunk = rod.sink(work);
         let led = sunk.and_then(|()| rod.climb(&given, None, work, &mut budget, self.stop));
-        self.rest = self.arrived(led, tensions);
+        self.arrived(led, tensions.to_vec())
     }
 
     /// The point that a climb led to.
@@ -171,17 +170,18 @@ impl Balance for Leaning<'_> {
         if away[nearest] == 0.0 && nearest == self.at && self.held {
             return true;
         }
-        if !self.points[nearest].sound || self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
-        {
+        if self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
             return false;
         }
         self.at = nearest;
-        let point = self.climb(tensions);
+        let known = self.points[nearest].sound;
+        // Without tensions there may be no shape, where the robot rests in an obstacle or under loads.
+        let point = if known { self.climb(tensions) } else { self.set_out(tensions) };
         self.held = point.sound;
         if !point.sound {
             return false;
         }
-        if away[nearest] > 0.0 {
+        if known && away[nearest] > 0.0 {
             let others = (0..POINTS).filter(|k| *k != nearest);
             let farthest =
                 others.fold(

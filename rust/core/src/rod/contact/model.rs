@@ -128,7 +128,7 @@ impl<'r> LoadedRod<'r> {
     ) -> Result<Report, InvalidInput> {
         self.plan().check_tensions(tensions)?;
         let tensions = tensions.iter().map(|tension| tension / self.plan().unit).collect();
-        Ok(self.rise(&Given::Tensions(tensions), work))
+        Ok(self.rise(&Given::Tensions(tensions), work, self.rod.stop.as_deref()))
     }
 
     /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
@@ -226,11 +226,29 @@ impl<'r> LoadedRod<'r> {
         Given::Lengths(rest.iter().zip(displacements).map(|(l, d)| l + d).collect())
     }
 
-    fn rise(&self, wanted: &Given, work: &mut Workspace) -> Report {
+    /// What stands in the way of a shape without tensions; empty when nothing does.
+    pub(crate) fn hindrance(&self) -> String {
+        let mut work = Workspace::default();
+        let none = Given::Tensions(vec![0.0; self.plan().rest_lengths.len()]);
+        self.rise(&none, &mut work, self.rod.stop.as_deref());
+        self.message(&[], &work)
+    }
+
+    /// [`Model::solve`] that ends soon after another flag is set.
+    pub(crate) fn lead(
+        &self,
+        displacements: &[f64],
+        work: &mut Workspace,
+        stop: Option<&AtomicBool>,
+    ) -> Report {
+        self.rise(&self.lengths(displacements), work, stop)
+    }
+
+    fn rise(&self, wanted: &Given, work: &mut Workspace, stop: Option<&AtomicBool>) -> Report {
         self.run(work, |work, budget| {
             self.begin(work);
             self.sink(work)?;
-            self.climb(wanted, None, work, budget, self.rod.stop.as_deref())
+            self.climb(wanted, None, work, budget, stop)
         })
     }
 
@@ -267,8 +285,7 @@ impl Model for LoadedRod<'_> {
     }
 
     fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
-        let wanted = self.lengths(displacements);
-        Ok(self.rise(&wanted, work))
+        Ok(self.lead(displacements, work, self.rod.stop.as_deref()))
     }
 
     fn resume(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
