@@ -11,6 +11,7 @@ from command_line import arm, facts, picture, points, run, save_arm
 
 import tdcr
 from tdcr import design
+from tdcr._cli import main
 
 
 @pytest.fixture
@@ -138,6 +139,28 @@ def test_fit_refuses_pulls_of_the_other_sign(measured, tmp_path, capsys):
     measured[measured.index("positive")] = "negative"
     _, err = run(capsys, *measured, "--parameters", "gain", code=2)
     assert err.endswith("m.csv: expected a pull, got releases alone: try --pull-sign positive\n")
+
+
+def test_fit_warns_of_pulls_that_release_alone(measured, tmp_path, capsys):
+    table = tmp_path / "m.csv"
+    head, *rows = [line for line in table.read_text().splitlines() if not line.startswith("1,")]
+    table.write_text("\n".join([head, *rows[:20]]))
+    measured[measured.index("positive")] = "negative"
+    main([*measured, "--parameters", "gain", "--model", "constant_curvature"])
+    _, err = capsys.readouterr()
+    assert err.startswith("tdcr: warning: m.csv: no row pulls a tendon if pulls are negative")
+
+
+@pytest.mark.filterwarnings("always")
+def test_warnings_are_lines(robot, tmp_path, capsys):
+    shape_places(tmp_path)
+    aside = np.linspace(0, 0.1, 40)[:, None] * [math.sin(0.3), 0.0, math.cos(0.3)]
+    target = points(tmp_path / "curve.csv", aside)
+    main(["design", "prebend", "finger.toml", target, "--pull", "-0.003", "--curve"])
+    _, err = capsys.readouterr()
+    line = err.splitlines()[0]
+    assert line.startswith("tdcr: warning: the curve leaves the base 17.2 deg off its z axis")
+    assert "RuntimeWarning" not in err
 
 
 @pytest.mark.parametrize("missing", ["--unit", "--pull-sign"])

@@ -117,6 +117,17 @@ def test_track_follows_a_path(robot, tmp_path, capsys):
     assert "says 'm', got 'mm'" in err
 
 
+def test_track_goes_between_points_in_steps(robot, tmp_path, capsys):
+    corners = path_places()[[0, 6, 12]]
+    path = points(tmp_path / "path.csv", corners, " [mm]", 1e3)
+    command = ["track", robot, path, "--model", "constant_curvature", "--step", "2.5"]
+    run(capsys, *command, "-o", "t.npz", code=1)  # Inside the surface where the arm's tip goes.
+    wanted = tdcr.cartesian_path(corners, 0.0025)
+    assert np.allclose(tdcr.InverseBatch.load("t.npz").targets, wanted, rtol=0, atol=1e-15)
+    _, err = run(capsys, *command[:-1], "0", code=2)
+    assert "step: expected a positive finite number [m], got 0.0" in err
+
+
 def test_rows_of_a_path_that_are_missed_are_counted(robot, tmp_path, capsys):
     places = np.vstack([path_places()[:3], [[1.0, 1.0, 1.0]]])
     path = points(tmp_path / "path.csv", places)

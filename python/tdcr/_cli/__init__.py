@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from io import TextIOWrapper
 
@@ -58,7 +59,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str] | None) -> int:
     """Run the command and say what went wrong."""
     try:
-        return int(_group.main(arguments, prog_name="tdcr", standalone_mode=False) or 0)
+        with warnings.catch_warnings():
+            warnings.showwarning = own.warn
+            return int(_group.main(arguments, prog_name="tdcr", standalone_mode=False) or 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         return 0

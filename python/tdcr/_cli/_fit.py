@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -98,14 +99,15 @@ def fit(
     own.checked_picture(plot_file)
     arm = Robot.load(robot)
     unit = options["unit"]
-    measured = read_measurements(
-        measurements,
-        unit=unit,
-        pull_sign=options["pull_sign"],
-        displacements=options["displacement_columns"],
-        positions=options["position_columns"],
-        free_from=options["free_from"],
-    )
+    with warnings.catch_warnings(record=True, action="always") as doubts:
+        measured = read_measurements(
+            measurements,
+            unit=unit,
+            pull_sign=options["pull_sign"],
+            displacements=options["displacement_columns"],
+            positions=options["position_columns"],
+            free_from=options["free_from"],
+        )
     columns = measured.displacement_columns
     if len(columns) != len(arm.tendons):
         names = ", ".join(arm.tendon_names)
@@ -120,6 +122,8 @@ def fit(
         other = {"positive": "negative", "negative": "positive"}[options["pull_sign"]]
         message = f"{measurements}: expected a pull, got releases alone: try --pull-sign {other}"
         raise InvalidInput(message, "pull_sign")
+    for doubt in doubts:
+        own.warn(doubt.message)
     found = solve(
         arm,
         measured,

@@ -146,6 +146,12 @@ def _pose(path: Path, unit: str) -> Any:
 @own.model_option("rod", "constant_curvature")
 @own.BOUNDS
 @own.target_option
+@click.option(
+    "--step",
+    type=float,
+    metavar="LENGTH",
+    help="Go from point to point in straight lines, by at most so much in a row, in --unit.",
+)
 @obstacles_option
 @own.json_option
 @own.picture_option
@@ -156,6 +162,7 @@ def track(
     model: str,
     bounds: list[float] | None,
     unit: str | None,
+    step: float | None,
     obstacles: Path | None,
     json_file: str | None,
     plot_file: str | None,
@@ -171,6 +178,8 @@ def track(
     own.checked_picture(plot_file)
     arm = Robot.load(robot)
     targets, unit = own.points(path, unit)
+    if step is not None:
+        targets = tdcr.cartesian_path(targets, *own.in_metres([step], unit))
     found = tdcr.track(
         arm,
         targets,

@@ -43,6 +43,7 @@ __all__ = [
     "target_option",
     "unit_doubted",
     "unit_option",
+    "warn",
     "workspace_picture",
     "writable",
     "write_text",
@@ -287,6 +288,11 @@ def unit_doubted(unit: str, length: float, robot: Robot, *, times: float = 1.0) 
     if unit != "m" or not length > times * own:
         return ""
     return f"; {length:g} m is much for a robot of {own:g} m: add --unit mm if mm are meant"
+
+
+def warn(message: Warning | str, *_: object) -> None:
+    """Say a warning on stderr, in one line and without a place in the code."""
+    click.echo(f"tdcr: warning: {message}", err=True)
 
 
 def said(ok: bool, name: str | None, status: str, message: str) -> int:
