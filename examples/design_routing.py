@@ -82,7 +82,7 @@ def figure(folder: Path) -> dict[int, design.Routing]:
         rows += [
             [f"{tendons} tendons", i, *(p.round(4) + 0.0), names[i]] for i, p in enumerate(disks)
         ]
-    holes.set(xlabel="disk", ylabel="hole, of 12")
+    holes.set(xlabel="disk", ylabel=f"hole ({HOLES} to a turn)", yticks=range(0, 2 * HOLES, 3))
     shape.plot([], [], "o", mfc="none", color="#222B35", ms=6, label="wanted")
     handles, labels = (
         [*one, *other]

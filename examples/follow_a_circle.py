@@ -64,7 +64,7 @@ def draw(path: tdcr.InverseBatch, frames: Array) -> Figure:
     share = np.linspace(0, 1, len(path))
     for k in range(9):
         line, style = COLOURS[k // 3], ("-", "--", ":")[k % 3]
-        name = f"end at segment {k // 3}" if k % 3 == 0 else None
+        name = f"tendons of segment {k // 3 + 1}" if k % 3 == 0 else None
         pulls = path.displacements[:, k] * MM
         axes.plot(share, pulls, style, color=line, linewidth=1.4, label=name)
     axes.legend(loc="upper center", ncols=3, fontsize=8, frameon=False, bbox_to_anchor=(0.5, 1.1))

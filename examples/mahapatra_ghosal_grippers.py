@@ -18,10 +18,14 @@ from __future__ import annotations
 import argparse
 import csv
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import tdcr
+
+if TYPE_CHECKING:
+    from mpl_toolkits.mplot3d import Axes3D
 
 LENGTH, COUNT, HOLE = 0.180, 9, 0.008
 DISTANCE, HEIGHT, RADIUS = 0.042, 0.110, 0.056
@@ -78,6 +82,12 @@ def turn_cube(most: float = 0.0045, steps: int = 20) -> tuple[np.ndarray, list[n
     return pulls, moments, grasps
 
 
+def leave_room(ax: Axes3D, zoom: float) -> None:
+    """Draw smaller, in the same proportions, so that arrows and labels stay inside."""
+    spans = np.ptp([ax.get_xlim3d(), ax.get_ylim3d(), ax.get_zlim3d()], axis=1)
+    ax.set_box_aspect(tuple(spans), zoom=zoom)
+
+
 def figures(output: Path) -> None:
     """Write all pictures and tables."""
     from matplotlib.figure import Figure
@@ -87,7 +97,9 @@ def figures(output: Path) -> None:
     grasp = gripper.close([-PULL * 10 / 9], ball, steps=20)
     figure = Figure(figsize=(10, 5.2), layout="constrained")
     for k, step in enumerate((0, -1)):
-        grasp.plot(step, ax=figure.add_subplot(1, 2, k + 1, projection="3d"))
+        ax = figure.add_subplot(1, 2, k + 1, projection="3d")
+        grasp.plot(step, ax=ax)
+        leave_room(ax, 0.9)
     figure.savefig(output / "mahapatra_11.png", dpi=110)
     rows = [
         [f"{share * PULL * 10 / 9 * 1e3:.3f}", k, c.disk, c.kind, f"{np.linalg.norm(c.force):.6f}"]
@@ -101,7 +113,9 @@ def figures(output: Path) -> None:
 
     pulls, moments, grasps = turn_cube()
     figure = Figure(figsize=(10, 4.8), layout="constrained")
-    grasps[-1].plot(ax=figure.add_subplot(1, 2, 1, projection="3d"), title="cube, both tendons")
+    ax = figure.add_subplot(1, 2, 1, projection="3d")
+    grasps[-1].plot(ax=ax, title="cube, both tendons")
+    leave_room(ax, 0.85)
     ax = figure.add_subplot(1, 2, 2)
     ax.plot(pulls * 1e3, np.array(moments)[:, 2] * 1e3, color="#0072B2")
     ax.set_xlabel("pull of the winding tendon [mm]")

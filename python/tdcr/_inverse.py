@@ -176,6 +176,11 @@ def inverse_solutions(
     -------
     list of Inverse
         Empty when none meets the target.
+
+    Raises
+    ------
+    InvalidInput
+        As `inverse`; also for the model "rod".
     """
     search = InverseSettings() if search is None else search
     bounds = _bounds(bounds)

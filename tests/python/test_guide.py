@@ -12,6 +12,7 @@ import re
 import shlex
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ import pytest
 import tdcr
 
 ROOT = Path(__file__).resolve().parents[2]
+MODULES = ("constant_curvature", "design", "planar", "pso")
 FENCE = re.compile(r"^```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 CODED = [
     page
@@ -83,6 +85,43 @@ def test_the_reference_names_everything_public():
         name for module in named for name in getattr(getattr(tdcr, module), "__all__", ())
     }
     assert named <= set(tdcr.__all__) <= named | with_modules
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The guide as it is read; where mkdocs is not installed `make test` builds it elsewhere."""
+    pytest.importorskip("material")
+    pytest.importorskip("mkdocstrings")
+    folder = tmp_path_factory.mktemp("site")
+    command = ["-m", "mkdocs", "build", "--quiet", "--strict", "-f", str(ROOT / "mkdocs.yml")]
+    subprocess.run([sys.executable, *command, "-d", str(folder)], check=True, cwd=ROOT)
+    return folder
+
+
+@pytest.mark.parametrize("module", ["", *MODULES])
+def test_the_built_reference_has_every_public_name(site, module):
+    inventory = (site / "objects.inv").read_bytes().split(b"\n", 4)[4]
+    documented = {line.split()[0] for line in zlib.decompress(inventory).decode().splitlines()}
+    of = getattr(tdcr, module) if module else tdcr
+    public = {f"{of.__name__}.{name}" for name in of.__all__}
+    assert public - {f"tdcr.{name}" for name in MODULES} <= documented
+
+
+def test_the_site_fetches_nothing(site):
+    """Links lead out of it; scripts, styles, pictures and formulas do not."""
+    loads = (
+        r"<(?:script|img|iframe|source)[^>]* src=\"(?:https?:)?//|<link[^>]* href=\"(?:https?:)?//"
+    )
+    pages = list(site.rglob("*.html"))
+    assert pages
+    for page in pages:
+        assert not re.findall(loads, page.read_text(encoding="utf-8")), page.name
+
+
+def test_statuses_are_explained():
+    page = (ROOT / "docs/troubleshooting.md").read_text(encoding="utf-8")
+    explained = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)  # with the heading
+    assert set(explained) == {str(status) for status in tdcr.Status} - {"converged"} | {"status"}
 
 
 def test_every_page_is_in_the_navigation():
