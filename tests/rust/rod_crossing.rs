@@ -160,3 +160,13 @@ fn a_tendon_next_to_the_centre_bends_no_way_before_another() {
     assert_eq!(shape.report.status, Status::Infeasible);
     assert!(shape.message.starts_with("no shape near rest"), "{}", shape.message);
 }
+
+#[test]
+fn a_pull_of_all_the_path_says_so() {
+    let robot = robot(LENGTH, 10, vec![Tendon::straight(0.0, 0.01).unwrap()]);
+    let plan = Plan::new(&robot, RodSettings::default()).unwrap();
+    let shape = Rod::new(&robot, &plan).shape(&[-12.0]).unwrap();
+    assert_eq!(shape.report.status, Status::Infeasible);
+    let expected = "tendon 't0' is pulled by 1.200e1 m, its path of 2.000e-1 m or more";
+    assert_eq!(shape.message, expected);
+}

@@ -2,6 +2,7 @@
 
 use super::ascent::Ending;
 use super::model::{Rod, Workspace};
+use super::plan::Plan;
 use super::settings::TendonRule;
 
 /// The message for displacements (or none, where tensions were given); empty when the solve converged.
@@ -19,6 +20,9 @@ pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Workspace) ->
             _ => "rest leads to no stable shape under these tensions: the backbone buckles before",
         };
         return text.to_owned();
+    }
+    if let Some(text) = nothing_left(rod, displacements) {
+        return text;
     }
     let over = |k: usize| {
         let stretch = plan.compliance[k] * state.tensions[k] / plan.unit;
@@ -56,4 +60,13 @@ pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Workspace) ->
         text += "give the tendons a stiffness if they are elastic";
     }
     text
+}
+
+/// A tendon that cannot stretch and is pulled by its path in the robot or more: often millimetres for metres.
+fn nothing_left(rod: &Rod<'_>, displacements: &[f64]) -> Option<String> {
+    let Plan { rest_lengths, compliance, .. } = rod.plan;
+    let (k, pull) = (displacements.iter().map(|d| -d).enumerate())
+        .find(|(k, pull)| compliance[*k] == 0.0 && *pull >= rest_lengths[*k])?;
+    let (name, path) = (&rod.robot.tendon_names()[k], rest_lengths[k]);
+    Some(format!("tendon '{name}' is pulled by {pull:.3e} m, its path of {path:.3e} m or more"))
 }
