@@ -212,6 +212,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
                 Freedom::None
             },
             method: self.settings.method,
+            swarms: usize::MAX,
             fall_back: self.settings.method == Method::Newton && starts > 1,
             nearest: true,
             swarm: &self.settings.swarm,
