@@ -60,6 +60,13 @@ def test_rows_and_paths_are_those_of_single_targets():
     assert rows.ok.all()
     alone = [tdcr.inverse(ROBOT, target, obstacles=[BAR]) for target in targets]
     np.testing.assert_array_equal(rows.displacements, [one.displacements for one in alone])
+    # What a row leaves behind does not change the next one, out of reach.
+    held = {"bounds": tdcr.Bounds(tension=(0, 0)), "obstacles": [BAR]}
+    mixed = [[0, 0, 0.18], [0, 0.05, 0.3]]
+    found = tdcr.inverse_batch(ROBOT, mixed, **held)
+    assert found.ok.tolist() == [True, False]
+    alone = [tdcr.inverse(ROBOT, target, **held) for target in mixed]
+    np.testing.assert_array_equal(found.displacements, [one.displacements for one in alone])
     np.testing.assert_allclose(rows[2].shape.positions[-1], targets[2], rtol=0, atol=1e-8)
     assert pickle.loads(pickle.dumps(rows)) == rows
     pulls = np.linspace(-0.004, -0.010, 60)[:, None]
