@@ -69,7 +69,8 @@ def inverse(
     model : {"rod", "constant_curvature"}, optional
     method : {"newton", "pso"}, optional
         "newton" descends from guessed and random starts, and from where a swarm settles as the last
-        resort; "pso" from where particle swarms settle.
+        resort; "pso" from where particle swarms settle, among obstacles and under loads only the
+        first few.
     start : array_like of shape (K,), Inverse or Shape, optional
         Displacements to try first, as along a path [m].
     bounds : Bounds or (lower, upper), optional

@@ -1,6 +1,7 @@
 """The inverse of the rod among obstacles and under loads; tensions among obstacles."""
 
 import pickle
+import time
 
 import numpy as np
 import pytest
@@ -59,6 +60,13 @@ def test_rows_and_paths_are_those_of_single_targets():
     assert rows.ok.all()
     alone = [tdcr.inverse(ROBOT, target, obstacles=[BAR]) for target in targets]
     np.testing.assert_array_equal(rows.displacements, [one.displacements for one in alone])
+    # What a row leaves behind does not change the next one, out of reach.
+    held = {"bounds": tdcr.Bounds(tension=(0, 0)), "obstacles": [BAR]}
+    mixed = [[0, 0, 0.18], [0, 0.05, 0.3]]
+    found = tdcr.inverse_batch(ROBOT, mixed, **held)
+    assert found.ok.tolist() == [True, False]
+    alone = [tdcr.inverse(ROBOT, target, **held) for target in mixed]
+    np.testing.assert_array_equal(found.displacements, [one.displacements for one in alone])
     np.testing.assert_allclose(rows[2].shape.positions[-1], targets[2], rtol=0, atol=1e-8)
     assert pickle.loads(pickle.dumps(rows)) == rows
     pulls = np.linspace(-0.004, -0.010, 60)[:, None]
@@ -203,3 +211,20 @@ LONG = """
 )
 def test_an_interrupt_ends_long_searches(call):
     assert_interrupts(LONG, call)
+
+
+def test_swarms_are_few_and_lose_nothing_against_descents():
+    bone = tdcr.Backbone([0.06] * 3, [4] * 3, youngs_modulus=200e9, diameter=0.001)
+    ends = [4 * (k // 3 + 1) for k in range(9)]
+    trunk = tdcr.Robot(bone, [tdcr.Tendon(2.1 * k, 0.008, end=end) for k, end in enumerate(ends)])
+    calls = []
+    for method in ("newton", "pso"):
+        # Far out of reach: all starts are tried, but only a few swarms.
+        begin = time.process_time()
+        answer = tdcr.inverse(trunk, [-0.15, 0, 0.1], obstacles=BAR, method=method)
+        assert answer.status is Status.unreachable
+        assert answer.starts == 50
+        calls.append((time.process_time() - begin, answer.error))
+    (short, nearest), (long, error) = calls
+    assert error < nearest + 1e-4
+    assert long < 8 * short

@@ -59,6 +59,8 @@ pub(super) struct Effort<'s> {
     /// What the target leaves, to spend on the energy.
     pub(super) freedom: Freedom,
     pub(super) method: Method,
+    /// No start beyond these is from a swarm.
+    pub(super) swarms: usize,
     /// A swarm is the last resort.
     pub(super) fall_back: bool,
     /// The nearest point is wanted where none meets the target.
@@ -102,7 +104,7 @@ impl<const R: usize> Search<'_, R> {
             if tried > 0 {
                 problem.restart();
             }
-            let inside = if effort.method == Method::Newton {
+            let inside = if effort.method == Method::Newton || k >= effort.swarms {
                 start(k, &mut self.point);
                 self.fit.restore(&space.region, &mut self.point)
             } else {

@@ -82,6 +82,8 @@ const WIDEST: f64 = 4.0;
 const LEVER: f64 = 1e-3;
 /// Starts among obstacles and under loads at most: each takes ten times as long.
 const LOADED: usize = 50;
+/// Starts from swarms there at most: each swarm takes as long as ten descents or more.
+const SWARMS: usize = 8;
 
 impl<'a> RodInverse<'a> {
     /// Prepares a robot; the plan must be of this robot.
@@ -243,6 +245,7 @@ impl<'a> RodInverse<'a> {
                 (true, Some(_)) => Freedom::Kinked,
             },
             method: self.settings.method,
+            swarms: if self.loaded.is_some() { SWARMS } else { usize::MAX },
             fall_back: self.settings.method == Method::Newton && starts > 1,
             nearest: true,
             swarm: &self.settings.swarm,

@@ -54,6 +54,8 @@ impl<'a> Rise<'a> {
     ) -> Found {
         let mut meet = Effort { freedom: Freedom::None, ..effort };
         self.leads = true;
+        // Not as the row before left it.
+        self.slacken(pull);
         let first = search.run(pull, space, meet, &mut start);
         if first.status != Status::Converged {
             return first;
