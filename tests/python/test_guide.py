@@ -116,6 +116,9 @@ def test_the_site_fetches_nothing(site):
     assert pages
     for page in pages:
         assert not re.findall(loads, page.read_text(encoding="utf-8")), page.name
+    for style in site.rglob("*.css"):
+        foreign = r"(?:@import|url\()\s*[\"']?(?:https?:)?//"
+        assert not re.findall(foreign, style.read_text(encoding="utf-8")), style.name
 
 
 def test_statuses_are_explained():
