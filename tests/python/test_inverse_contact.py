@@ -227,7 +227,7 @@ def test_swarms_are_few_and_lose_nothing_against_descents():
 
 
 def test_only_the_first_starts_among_obstacles_are_swarms():
-    bone = tdcr.Backbone(0.06, 2, youngs_modulus=200e9, diameter=0.001)
+    bone = tdcr.Backbone(0.06, 3, youngs_modulus=200e9, diameter=0.001)
     finger = tdcr.Robot(bone, [tdcr.Tendon(2.1 * k, 0.008) for k in range(3)])
     asked = 0
 
