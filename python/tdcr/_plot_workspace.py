@@ -114,11 +114,15 @@ def _section(ax: Any, seen: VoxelMap, scale: float) -> Any:
     """Squares of the layer of voxels beside the plane y = 0."""
     from matplotlib.collections import PolyCollection
 
-    layer = (seen.centers[:, 1] > 0.0) & (seen.centers[:, 1] < seen.voxel)
+    y = seen.centers[:, 1]
+    layer, before = (y > 0.0) & (y < seen.voxel), (y < 0.0) & (y > -seen.voxel)
+    if _few(seen, layer, before):
+        # Tips in the plane itself, which rounding puts on its other side.
+        layer = before
     if not layer.any():
         # Nothing there, as of tips in another plane: the layer that is nearest.
-        nearest = seen.centers[np.abs(seen.centers[:, 1]).argmin(), 1]
-        layer = np.abs(seen.centers[:, 1] - nearest) < 0.5 * seen.voxel
+        nearest = y[np.abs(y).argmin()]
+        layer = np.abs(y - nearest) < 0.5 * seen.voxel
     corners = 0.5 * seen.voxel * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     squares = (seen.centers[layer][:, None, [0, 2]] + corners) * scale
     # Edges of the face's colour hide the seams that some readers of PDF show.
@@ -137,10 +141,15 @@ def _section(ax: Any, seen: VoxelMap, scale: float) -> Any:
     return painted
 
 
+def _few(seen: VoxelMap, some: Any, others: Any) -> bool:
+    """Whether some voxels hold next to none of the tips that they and others hold."""
+    return bool(10 * seen.counts[some].sum() < seen.counts[others].sum())
+
+
 def _solid(ax: Any, workspace: Workspace, seen: VoxelMap, scale: float) -> Any:
     """Centres of the voxels behind the plane y = 0, so that one looks inside."""
     behind = seen.centers[:, 1] > 0.0
-    behind = behind if behind.any() else np.ones(len(behind), bool)
+    behind = np.ones(len(behind), bool) if _few(seen, behind, ~behind) else behind
     points = seen.centers[behind] * scale
     whole = np.concatenate([seen.centers, _backbone(workspace)]) * scale
     # Squares about as wide as a voxel: 4 inches hold the longest span.

@@ -21,6 +21,8 @@ __all__ = ["Grid", "Volume", "VoxelMap", "default_voxel", "solid_angles", "volum
 
 # Points per voxel of the bounding box if no size is given: fewer leave holes, more leave steps.
 _PER_VOXEL = 20
+# Share of a voxel that rounding may move a point by.
+_ROUNDING = 1e-6
 # Points per occupied voxel below which nothing is known of the volume.
 _FEW = 5
 # Where a grid starts, in voxels: a lattice of four, so that the answer hangs less on one of them.
@@ -56,6 +58,15 @@ class VoxelMap(NamedTuple):
         """Pickle and copy with arrays that stay read-only."""
         return rebuilt, (type(self), *self)
 
+    def __repr__(self) -> str:
+        """Tell how many voxels of which edge, and between what the values are."""
+        values = (
+            f", values {self.values.min():.3g} to {self.values.max():.3g}"
+            if len(self.values)
+            else ""
+        )
+        return f"<VoxelMap of {len(self.values)} voxels of {self.voxel:.3g} m{values}>"
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -69,8 +80,10 @@ class Grid:
     @staticmethod
     def of(points: Floats, voxel: float) -> Grid:
         """Put the points into voxels of a grid whose planes go through the world's origin."""
-        shift = np.floor(points.min(axis=0) / voxel)
-        cells = np.floor(points / voxel) - shift
+        # Tips of a planar robot are in one of the planes but for rounding: all in the same layer.
+        cells = np.floor(points / voxel + _ROUNDING)
+        shift = cells.min(axis=0)
+        cells -= shift
         return Grid(shift * voxel, voxel, *_keys(cells, voxel))
 
     def centers(self, keys: Whole) -> Floats:

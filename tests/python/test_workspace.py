@@ -1,5 +1,6 @@
 """Workspaces: samples, chunks, executors, and what is read off the cloud of tips."""
 
+import dataclasses
 import math
 import pickle
 import sys
@@ -239,6 +240,34 @@ def test_pictures_show_what_is_asked():
     here = found.plot(value="samples")
     limits = [ax.dataLim.get_points() for ax in (there, here)]
     assert limits[0] == pytest.approx(limits[1])
+    pyplot.close("all")
+
+
+def test_tips_in_a_plane_of_the_grid_are_in_one_layer():
+    found = sample(2000)
+    tips = found.tips.copy()
+    tips[:, 1] = np.where(np.arange(2000) % 2, 1e-17, -1e-17)
+    seen = dataclasses.replace(found, tips=tips).dexterity(0.002)
+    assert np.unique(seen.centers[:, 1]).tolist() == [0.001]
+    assert seen.counts.sum() == 2000
+    least, most = seen.values.min(), seen.values.max()
+    edge = f"voxels of 0.002 m, values {least:.3g} to {most:.3g}>"
+    assert repr(seen) == f"<VoxelMap of {len(seen.values)} {edge}"
+
+
+@pytest.mark.parametrize("view", ["section", "3d"])
+def test_tips_in_the_plane_of_the_section_are_shown(view):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    # Rounding puts the tips of a planar robot a hair before the plane, but for the straight one.
+    pair = [tdcr.Tendon(0.0, 0.008), tdcr.Tendon(np.pi, 0.008)]
+    robot = tdcr.Robot(tdcr.Backbone(0.1, 10), pair)
+    found = tdcr.workspace(robot, [(-0.01, 0), (np.inf, np.inf)], 500, sampling="grid", **MODEL)
+    tips = found.tips.copy()
+    tips[1:, 1], tips[:1, 1] = -1e-9, 1e-9
+    seen = dataclasses.replace(found, tips=tips)
+    ax = seen.plot(view=view, value="samples")
+    (painted,) = [c for c in ax.collections if c.get_array() is not None]
+    assert painted.get_array().sum() >= 499
     pyplot.close("all")
 
 
