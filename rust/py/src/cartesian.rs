@@ -7,7 +7,7 @@ use tdcr::inverse::{Target, cartesian_path as core_path};
 
 use crate::arguments::number;
 use crate::convert::{float_array, invalid};
-use crate::inverse::many_targets;
+use crate::targets::many_targets;
 
 /// A path of the tool through waypoints, for `track` or `inverse_batch`.
 ///

@@ -1,26 +1,19 @@
-//! The engines of `inverse`, `inverse_batch`, `track` and `inverse_solutions`; their docstrings are in
-//! Python.
+//! The engines of `inverse` and `inverse_solutions`; their docstrings are in Python.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
-use nalgebra::{Matrix4, Vector3};
+use nalgebra::Vector3;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
-use rayon::ThreadPool;
-use tdcr::batch::pool;
 use tdcr::inverse::{
-    Answer, ConstantCurvatureInverse, InverseRows, Inverter, Method, Placed, RodInverse, Target,
-    invert_path, invert_rows,
+    Answer, ConstantCurvatureInverse, Inverter, Method, Placed, RodInverse, Target,
 };
 use tdcr::model::State;
-use tdcr::robot::rigid_motion;
 use tdcr::rod::contact::Scene;
-use tdcr::{InvalidInput, Status, constant_curvature, rod};
+use tdcr::{InvalidInput, constant_curvature, rod};
 
-use crate::arguments::{optional, whole};
 use crate::bounds::Bounds;
 use crate::choice::{Choice, rod_only};
 use crate::convert::{float_array, frozen, invalid, status, values, wrong_shape};
@@ -30,6 +23,7 @@ use crate::rod::Load;
 use crate::settings::InverseSettings;
 use crate::shape::Shape;
 use crate::surroundings::{self, Surroundings, Watched, checked};
+use crate::targets::one_target;
 
 /// Steps and evaluations, of a few tenths of a microsecond each, up to which a single inverse ends soon
 /// enough to go without listening for Ctrl-C.
@@ -46,62 +40,20 @@ fn soon(search: &tdcr::inverse::InverseSettings, each: usize) -> bool {
     steps.saturating_add(swarms.saturating_mul(starts)).saturating_mul(each) <= SOON
 }
 
-/// One target from its numbers: 3 of a position or 16 of a frame.
-fn target(argument: &str, numbers: &[f64]) -> Result<Target, InvalidInput> {
-    let made = if numbers.len() == 3 {
-        Target::point(Vector3::from_column_slice(numbers))
-    } else {
-        rigid_motion("target", &Matrix4::from_row_slice(numbers)).map(|pose| Target::frame(&pose))
-    };
-    made.map_err(|error| InvalidInput { argument: argument.to_owned(), ..error })
-}
-
-/// A single target.
-fn one_target(value: &Bound<'_, PyAny>) -> PyResult<Target> {
-    let array = float_array("target", value)?;
-    match array.shape() {
-        [3] | [4, 4] => target("target", values(&array)?).map_err(|e| invalid(&e)),
-        shape => {
-            let expected = "a position of shape (3,) or a frame of shape (4, 4)";
-            Err(wrong_shape("target", expected, shape))
-        }
-    }
-}
-
-/// Rows of targets.
-pub(crate) fn many_targets(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Target>> {
-    let array = float_array(argument, value)?;
-    let width = match array.shape() {
-        [_, 3] => 3,
-        [_, 4, 4] => 16,
-        shape => {
-            let expected = "positions of shape (B, 3) or frames of shape (B, 4, 4)";
-            return Err(wrong_shape(argument, expected, shape));
-        }
-    };
-    let rows = values(&array)?.chunks_exact(width).enumerate();
-    rows.map(|(row, numbers)| {
-        target(argument, numbers).map_err(|error| {
-            invalid(&InvalidInput { got: format!("{} in row {row}", error.got), ..error })
-        })
-    })
-    .collect()
-}
-
 /// The model's knowledge of a robot, which an inverse refers to.
-enum Plans<'a> {
+pub(crate) enum Plans<'a> {
     Arcs(&'a constant_curvature::Plan),
     Rod(Arc<rod::Plan>, Option<Scene>),
 }
 
 /// An inverse of one of the models.
-enum Engine<'a> {
+pub(crate) enum Engine<'a> {
     Arcs(Box<ConstantCurvatureInverse<'a>>),
     Rod(Box<RodInverse<'a>>),
 }
 
 impl<'a> Plans<'a> {
-    fn new(
+    pub(crate) fn new(
         robot: &'a Bound<'_, Robot>,
         model: &str,
         settings: Option<&Bound<'_, PyAny>>,
@@ -129,7 +81,7 @@ impl<'a> Plans<'a> {
         .map_err(|e| invalid(&e))
     }
 
-    fn engine(
+    pub(crate) fn engine(
         &'a self,
         robot: &'a Bound<'_, Robot>,
         bounds: Option<&Bound<'_, PyAny>>,
@@ -162,19 +114,8 @@ impl<'a> Plans<'a> {
     }
 }
 
-/// Refuses targets that are too far away.
-fn check_targets<I: Inverter>(inverse: &I, targets: &[Target]) -> PyResult<()> {
-    for (row, target) in targets.iter().enumerate() {
-        inverse.check_target(target).map_err(|error| {
-            let got = format!("{} in row {row}", error.got);
-            invalid(&InvalidInput { argument: "targets".to_owned(), got, ..error })
-        })?;
-    }
-    Ok(())
-}
-
 /// Displacements of a start.
-fn one_start(
+pub(crate) fn one_start(
     robot: &tdcr::robot::Robot,
     value: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Option<Vec<f64>>> {
@@ -186,22 +127,6 @@ fn one_start(
         return Err(wrong_shape("start", &expected, array.shape()));
     }
     Ok(Some(values(&array)?.to_vec()))
-}
-
-/// Displacements of a start of all rows, or of one for each.
-fn many_starts(
-    robot: &tdcr::robot::Robot,
-    rows: usize,
-    value: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Vec<f64>> {
-    let Some(value) = value else { return Ok(Vec::new()) };
-    let array = float_array("start", value)?;
-    let tendons = robot.tendons().len();
-    if array.shape() != [tendons] && array.shape() != [rows, tendons] {
-        let expected = format!("displacements of shape ({tendons},) or ({rows}, {tendons})");
-        return Err(wrong_shape("start", &expected, array.shape()));
-    }
-    Ok(values(&array)?.to_vec())
 }
 
 /// Errors of a start that is solved for name it.
@@ -422,101 +347,4 @@ pub(crate) fn _inverse_solutions(
         ))
     });
     rows.collect()
-}
-
-/// Columns of many inverses, each alone (`chain` false) or from the answer of the one before.
-#[pyfunction]
-#[pyo3(signature = (robot, targets, *, model, start, bounds, settings, search, method, threads, progress, chain,
-    obstacles, loads))]
-#[allow(clippy::too_many_arguments)] // The keywords of inverse_batch and track.
-pub(crate) fn _inverse_batch<'py>(
-    py: Python<'py>,
-    robot: &Bound<'py, Robot>,
-    targets: &Bound<'py, PyAny>,
-    model: &str,
-    start: Option<&Bound<'py, PyAny>>,
-    bounds: Option<&Bound<'py, PyAny>>,
-    settings: Option<&Bound<'py, PyAny>>,
-    search: Option<&Bound<'py, InverseSettings>>,
-    method: &str,
-    threads: Option<&Bound<'py, PyAny>>,
-    progress: Option<&Bound<'py, PyAny>>,
-    chain: bool,
-    obstacles: &Bound<'py, PyAny>,
-    loads: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
-    let around = Surroundings::new(py, Some(obstacles), loads)?;
-    let plans = Plans::new(robot, model, settings, &around)?;
-    let engine = plans.engine(robot, bounds, search, method)?;
-    let targets = many_targets("targets", targets)?;
-    let pool = if chain {
-        None
-    } else {
-        let threads = optional("threads", threads, whole)?;
-        Some(pool(threads).map_err(|e| invalid(&e))?)
-    };
-    let pool = pool.as_deref();
-    match &engine {
-        Engine::Arcs(inverse) => {
-            invert_many(py, &**inverse, &targets, start, pool, progress, &around)
-        }
-        Engine::Rod(inverse) => {
-            let rows = invert_many(py, &**inverse, &targets, start, pool, progress, &around)?;
-            checked(py, Mutex::new(inverse.take_fault()))?;
-            Ok(rows)
-        }
-    }
-}
-
-/// On a pool each alone, without one as a path.
-fn invert_many<'py, I: Inverter>(
-    py: Python<'py>,
-    inverse: &I,
-    targets: &[Target],
-    start: Option<&Bound<'py, PyAny>>,
-    pool: Option<&ThreadPool>,
-    progress: Option<&Bound<'py, PyAny>>,
-    around: &Surroundings,
-) -> PyResult<Bound<'py, PyDict>> {
-    check_targets(inverse, targets)?;
-    let answers = if let Some(pool) = pool {
-        let starts = many_starts(inverse.robot(), targets.len(), start)?;
-        long_call::run(py, progress, |control| {
-            around.stopped_by(&control.stop);
-            invert_rows(inverse, targets, &starts, pool, control)
-        })?
-    } else {
-        let start = one_start(inverse.robot(), start)?;
-        long_call::run(py, progress, |control| {
-            around.stopped_by(&control.stop);
-            invert_path(inverse, targets, start.as_deref(), control)
-        })?
-    };
-    let answers = answers.map_err(|e| invalid(&e))?;
-    // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
-    export(py, answers.unwrap_or_default(), inverse.robot().tendons().len())
-}
-
-fn export(py: Python<'_>, rows: InverseRows, tendons: usize) -> PyResult<Bound<'_, PyDict>> {
-    let InverseRows { displacements, tensions, answers } = rows;
-    let count = [answers.len()];
-    let columns = PyDict::new(py);
-    columns.set_item("displacements", frozen(py, displacements, &[answers.len(), tendons])?)?;
-    columns.set_item("tensions", frozen(py, tensions, &[answers.len(), tendons])?)?;
-    let mut statuses = Vec::with_capacity(answers.len());
-    for answer in &answers {
-        statuses.push(status(py, answer.status)?.unbind());
-    }
-    columns.set_item("status", frozen(py, statuses, &count)?)?;
-    let floats = |column: fn(&Answer) -> f64| answers.iter().map(column).collect::<Vec<f64>>();
-    columns.set_item("error", frozen(py, floats(|a| a.distance), &count)?)?;
-    columns.set_item("rotation_error", frozen(py, floats(|a| a.angle), &count)?)?;
-    let counts = |column: fn(&Answer) -> usize| {
-        answers.iter().map(|a| column(a) as u64).collect::<Vec<u64>>()
-    };
-    columns.set_item("iterations", frozen(py, counts(|a| a.iterations), &count)?)?;
-    columns.set_item("starts", frozen(py, counts(|a| a.starts), &count)?)?;
-    let ok = answers.iter().map(|a| a.status == Status::Converged).collect();
-    columns.set_item("ok", frozen::<bool>(py, ok, &count)?)?;
-    Ok(columns)
 }

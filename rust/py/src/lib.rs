@@ -19,6 +19,7 @@ mod convert;
 mod design;
 mod forward;
 mod inverse;
+mod inverse_batch;
 mod jacobian;
 mod loads;
 mod long_call;
@@ -37,6 +38,7 @@ mod settings;
 mod shape;
 mod signed_distance;
 mod surroundings;
+mod targets;
 mod tendon;
 mod volumes;
 
@@ -64,7 +66,9 @@ mod _core {
     #[pymodule_export]
     use crate::forward::forward;
     #[pymodule_export]
-    use crate::inverse::{_inverse, _inverse_batch, _inverse_places, _inverse_solutions};
+    use crate::inverse::{_inverse, _inverse_places, _inverse_solutions};
+    #[pymodule_export]
+    use crate::inverse_batch::_inverse_batch;
     #[pymodule_export]
     use crate::jacobian::jacobian;
     #[pymodule_export]
