@@ -298,6 +298,7 @@ def fit(
     status = Status.converged if done else Status.iteration_limit
     parts = [] if done else [f"still falling after {iterations} iterations"]
     failed = int(np.count_nonzero(~solved))
+    parts += problem.at_bounds(values)
     parts += unsolved(failed, count)
     parts += far_off(np.linalg.norm(after[~held], axis=2), robot.backbone.total_length)
     for array in (after, before, measured.rows, held):

@@ -138,19 +138,31 @@ class Problem:
             values[part] = own.get(name, 0.0)
         return values
 
-    def bounded(self, values: Array) -> Array:
-        """Values that a robot can have."""
-        values = values.copy()
-        for name, low, high in (
+    def _limits(self) -> tuple[Array, Array]:
+        """Least and greatest values that a robot can have."""
+        disk = self._given.backbone.disk_radius
+        low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        for name, least, most in (
             ("gain", 1e-3, 1e3),
-            ("radius", 1e-6, np.inf),
+            # Holes are in the disks.
+            ("radius", 1e-6, np.inf if disk is None else disk),
             ("stiffness", 1e-3, 1e12),
             ("poisson_ratio", -0.99, 0.5),
         ):
             if name in self._slices:
-                part = self._slices[name]
-                values[part] = values[part].clip(low, high)
-        return values
+                low[self._slices[name]], high[self._slices[name]] = least, most
+        return low, high
+
+    def bounded(self, values: Array) -> Array:
+        """Values that a robot can have."""
+        return values.clip(*self._limits())
+
+    def at_bounds(self, values: Array) -> list[str]:
+        """Say which values are as small or as great as a robot can have."""
+        low, high = self._limits()
+        held = self.named(((values <= low) | (values >= high)).astype(np.float64))
+        bound = [name for name, those in held.items() if those.any()]
+        return [f"at the least or greatest that a robot can have: {', '.join(bound)}"] * bool(bound)
 
     def robot(self, values: Array) -> Robot:
         """Return the robot with the values."""

@@ -350,3 +350,14 @@ def test_the_measured_robot_is_fitted_as_the_guide_says():
     assert fits[-1].mean() < 1.1 * fits[-1].mean("train")
     assert fits[-1].mean() < 0.6 * fits[-1].mean(before=True)
     assert fits[-1].failed == fits[-1].dropped == 0
+
+
+def test_holes_stay_in_the_disks():
+    disks = tdcr.Backbone(0.2, 10, disk_radius=0.0105)
+    arm = tdcr.Robot(disks, [tdcr.Tendon(0.0, 0.010), tdcr.Tendon(2.0, 0.010)])
+    wide = tdcr.Robot(tdcr.Backbone(0.2, 10), [tdcr.Tendon(a, 0.012) for a in (0.0, 2.0)])
+    pulls = np.array([[-0.001 * k, np.inf][:: 1 - 2 * (k % 2)] for k in range(1, 11)])
+    tips = tdcr.forward_batch(wide, pulls).tip[:, :3, 3]
+    found = design.fit(arm, tips, ["radius"], displacements=pulls, validation=0)
+    assert found.parameters["radius"].tolist() == [0.0105, 0.0105]
+    assert "at the least or greatest that a robot can have: radius" in found.message

@@ -60,7 +60,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     """Run the command and say what went wrong."""
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = own.warn
+            warnings.showwarning = lambda message, *_, **__: own.warn(message)
             return int(_group.main(arguments, prog_name="tdcr", standalone_mode=False) or 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())

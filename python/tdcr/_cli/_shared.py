@@ -290,7 +290,7 @@ def unit_doubted(unit: str, length: float, robot: Robot, *, times: float = 1.0) 
     return f"; {length:g} m is much for a robot of {own:g} m: add --unit mm if mm are meant"
 
 
-def warn(message: Warning | str, *_: object) -> None:
+def warn(message: Warning | str) -> None:
     """Say a warning on stderr, in one line and without a place in the code."""
     click.echo(f"tdcr: warning: {message}", err=True)
 
