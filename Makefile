@@ -85,6 +85,7 @@ runs: package
 	$(BIN)/tdcr demo --output target/runs/demo
 	for script in examples/*.py; do $(BIN)/python $$script --output target/runs/figures || exit 1; done
 	for script in benches/peers/*.py; do $(BIN)/python $$script --quick || exit 1; done
+	$(BIN)/python benches/leaning.py --cases 20
 
 figures: $(VENV)/installed
 	for script in examples/*.py; do $(BIN)/python $$script --output examples/figures || exit 1; done
