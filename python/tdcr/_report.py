@@ -176,8 +176,14 @@ def text_of(text: str) -> Any:
 def console_of() -> Console:
     from rich.console import Console
 
+    class Told(Console):
+        """Console that leaves it to its caller that the reader has gone, rather than exit."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
     # Into a pipe or a file: plain, and no line is broken to fit a terminal.
-    return Console(highlight=False) if sys.stdout.isatty() else Console(
+    return Told(highlight=False) if sys.stdout.isatty() else Told(
         highlight=False, width=400, no_color=True
     )  # fmt: skip
 

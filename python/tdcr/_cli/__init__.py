@@ -43,17 +43,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit code.
     """
     _open_streams()
+    code = 0
     try:
         code = _run(arguments)
         sys.stdout.flush()
     except (BrokenPipeError, Unread):
-        # The reader has gone (| head): nothing is left to say, also not at exit. The code is what
-        # a shell gives programs that this signal ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # The reader has gone (| head): nothing is left to say. The code is what a shell gives
+        # programs that this signal ends.
+        _drop_stdout()
         return 128 + signal.SIGPIPE
     except OSError as error:
-        return _refuse(f"stdout: {error.strerror or error}")
+        _drop_stdout()
+        # What is refused has been said.
+        return code if code == 2 else _refuse(f"stdout: {error.strerror or error}")
     return code
+
+
+def _drop_stdout() -> None:
+    """Let go what stdout still holds, which would fail once more at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _run(arguments: Sequence[str] | None) -> int:
