@@ -9,6 +9,7 @@ import numpy as np
 
 from tdcr import _core
 from tdcr._batch import forward_batch
+from tdcr._rotations import rotation, spins
 from tdcr.errors import InvalidInput, NotConverged
 
 if TYPE_CHECKING:
@@ -191,7 +192,7 @@ class Problem:
             )
         if "base" in at:
             shift = np.eye(4)
-            shift[:3, :3] = _rotation(at["base"][3:]) @ base[:3, :3]
+            shift[:3, :3] = rotation(at["base"][3:]) @ base[:3, :3]
             shift[:3, 3] = base[:3, 3] + at["base"][:3]
             base = shift
         return _core.Robot(backbone, tendons, base=base, tool=given.tool, name=given.name)
@@ -231,7 +232,7 @@ class Problem:
         if "base" in self._slices:
             part = out[self._slices["base"]]
             arms = self._points(values, measured)[0] - self.robot(values).base[:3, 3]
-            for c, spin in enumerate(_spins(values[self._slices["base"]][3:])):
+            for c, spin in enumerate(spins(values[self._slices["base"]][3:])):
                 part[c] = np.eye(3)[c]
                 part[3 + c] = np.cross(spin, arms)
         return out
@@ -298,28 +299,3 @@ class Problem:
         if "rest" in self._slices:
             found["rest"] = (robot.backbone.lengths[:, None] * by.rest).sum(axis=0)[:2]
         return found
-
-
-def _cross(vector: Array) -> tuple[float, Array]:
-    """Length of a vector, and the matrix of its cross product."""
-    x, y, z = vector
-    return float(np.linalg.norm(vector)), np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def _spins(vector: Array) -> Array:
-    """Rows: angular velocity by each entry of a rotation vector, the left Jacobian's columns."""
-    angle, cross = _cross(vector)
-    second = 0.5 * np.sinc(angle / 2 / np.pi) ** 2
-    # (a - sin(a))/a^3, by its series where that cancels.
-    third = (angle - np.sin(angle)) / angle**3 if angle > 1e-2 else 1 / 6 - angle**2 / 120
-    spins: Array = (np.eye(3) + second * cross + third * cross @ cross).T
-    return spins
-
-
-def _rotation(vector: Array) -> Array:
-    """Rodrigues' formula."""
-    angle, cross = _cross(vector)
-    # sin(a)/a and (1 - cos(a))/a^2, the latter by half angles.
-    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / 2 / np.pi) ** 2
-    turned: Array = np.eye(3) + first * cross + second * cross @ cross
-    return turned

@@ -99,26 +99,15 @@ def _bounds(bounds: list[float] | None, unit: str) -> Any:
 def _target(position: Any, rotation: Any, unit: str) -> Any:
     import numpy as np
 
+    from tdcr import _rotations
+
     place = np.array(own.in_metres(position, unit))
     if rotation is None:
         return place
     frame = np.eye(4)
-    frame[:3, :3] = _turned(np.radians(rotation))
+    frame[:3, :3] = _rotations.rotation(np.radians(rotation))
     frame[:3, 3] = place
     return frame
-
-
-def _turned(vector: Any) -> Any:
-    """Rotation matrix of a rotation vector, by Rodrigues' formula."""
-    import numpy as np
-
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    # The skew matrix of the axis.
-    cross = np.cross(np.eye(3), vector / angle)
-    turned: Any = np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
-    return turned
 
 
 def _pose(path: Path, unit: str) -> Any:
