@@ -1,7 +1,6 @@
 """tdcr.pso: Python functions, settings as values, exceptions, callbacks, Ctrl-C."""
 
 import copy
-import doctest
 import inspect
 import math
 import pickle
@@ -364,11 +363,6 @@ def test_other_threads_run_meanwhile():
     end = time.monotonic()
     thread.join()
     assert stamps[0] - begin < 0.5 * (end - begin)
-
-
-def test_doctests_run():
-    assert doctest.testmod(pso).failed == 0
-    assert doctest.testmod(pso).attempted > 0
 
 
 @pytest.mark.parametrize("name", pso.__all__)
