@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import struct
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 from command_line import points, run, save_arm
+from interrupts import handler, interrupt, started
 
 import tdcr
 
@@ -24,14 +23,15 @@ def robot(tmp_path, monkeypatch):
 
 
 GRID = ["--ranges", "-10:0 -5 free", "--unit", "mm", "--samples", "50", "--sampling", "grid"]
+# What runs when all is read, and so long that it never ends.
 LONG = {
-    "workspace": ["--ranges", "-0.01:0 free free", "--samples", "3000000", "--sampling", "random",
+    "workspace": ["tdcr.workspace", "--ranges", "-0.01:0 free free", "--samples", "3000000", "--sampling", "random",
                   "--output", "w.npz"],
-    "track": ["path.csv", "--output", "t.npz"],
-    "plot": ["--pull", "-0.01 -0.004 free", "--animate", "p.gif", "--frames", "500"],
-    "fit": ["bench.csv", "--unit", "mm", "--pull-sign", "negative", "--parameters",
+    "track": ["tdcr.track", "path.csv", "--output", "t.npz"],
+    "plot": ["tdcr.animate", "--pull", "-0.01 -0.004 free", "--animate", "p.gif", "--frames", "500"],
+    "fit": ["design.fit", "bench.csv", "--unit", "mm", "--pull-sign", "negative", "--parameters",
             "gain,base,radius,azimuth", "-o", "f.toml"],
-    "design routing": ["bend.csv", "-o", "r.toml", "--curve"],
+    "design routing": ["design.routing", "bend.csv", "-o", "r.toml", "--curve"],
 }  # fmt: skip
 
 
@@ -47,20 +47,22 @@ def test_interrupting_ends_with_130_and_one_line(command, robot, tmp_path):
     noise = np.random.default_rng(0).normal([-5, 0, 0, 30, 30, 180], 4, (6000, 6))
     rows = [",".join(map(str, row)) for row in noise.tolist()]
     (tmp_path / "bench.csv").write_text("\n".join(["d0,d1,d2,x,y,z", *rows]))
-    # A shell's background job starts with SIGINT ignored.
-    code = (
-        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from tdcr._cli import main; print('ready', flush=True); sys.exit(main(sys.argv[1:]))"
+    work, *arguments = LONG[command]
+    code = "\n".join(
+        [
+            "import sys, tdcr",
+            "from tdcr import design",
+            "from tdcr._cli import main",
+            handler(f"within(frame, {work})"),
+            "print('ready', flush=True)",
+            "sys.exit(main(sys.argv[1:]))",
+        ]
     )
     before = set(tmp_path.iterdir())
-    arguments = [sys.executable, "-c", code, *command.split(), robot, *LONG[command]]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(arguments, **pipes) as process:
+    with started(code, *command.split(), robot, *arguments) as process:
         assert process.stdout.readline() == "ready\n"
-        time.sleep(1.0)
-        assert process.poll() is None
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=30)
+        interrupt(process)
+        out, err = process.communicate()
     assert (process.returncode, out, err) == (130, "", "tdcr: interrupted\n")
     assert set(tmp_path.iterdir()) == before
 
