@@ -267,9 +267,9 @@ mod tests {
     use super::super::InverseSettings;
     use super::super::Target;
     use super::super::bounds::Bounds;
-    use super::super::places::PlacesGoal;
+    use super::super::position_goal::PlacesGoal;
     use super::super::rod::RodInverse;
-    use super::super::rows::Inverter;
+    use super::super::batch::Inverter;
     use super::*;
     use crate::lie::{Pose, so3};
     use crate::obstacle::{Obstacle, Sphere};

@@ -246,7 +246,7 @@ mod tests {
     /// Directions fill the circle evenly, in any number of dimensions each coordinate alike.
     #[test]
     fn directions_prefer_nothing() {
-        let mut draws = super::super::draws::Draws::default();
+        let mut draws = super::super::random::Draws::default();
         draws.resize(1, 3);
         draws.seed(5);
         let (mut mean, mut square) = ([0.0; 3], [0.0; 3]);
