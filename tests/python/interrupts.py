@@ -1,6 +1,5 @@
 """What the tests of Ctrl-C share."""
 
-import signal
 import subprocess
 import sys
 import textwrap
@@ -8,31 +7,43 @@ import threading
 from contextlib import contextmanager
 
 # Ends what hangs, and decides nothing else: a call that listens needs a thousandth of it [s].
-HANG = 300.0
+HANG = 120.0
 
 
-def handler(at_work):
-    """Statements that make a process say at every Ctrl-C whether it is at work; the third time that
-    it is, it is interrupted. `at_work` is of the frame that is interrupted.
+def interrupts(at_work):
+    """Statements that interrupt the process when it is at work, at the third look that it takes.
+
+    At the first two its handler only counts: that it is at work and listens is known then, and no
+    time was waited for. `at_work` is of the frame of the main thread and the one before.
     """
     return f"""\
-import os, signal
-last, left = None, 3
+import os, signal, sys, threading, time
+looks = 0
+def on_signal(*_):
+    global looks
+    looks += 1
+    if looks == 3:
+        raise KeyboardInterrupt
 def within(frame, function):
     return frame is not None and (
         frame.f_code is function.__code__ or within(frame.f_back, function)
     )
 def called(frame):
     return frame.f_code.co_filename == "<string>" and frame.f_code.co_name != "<module>"
-def on_signal(_, frame):
-    global last, left
-    here, last = last, (frame, frame.f_lasti)
-    working = {at_work}
-    left -= working
-    if left == 0:
-        raise KeyboardInterrupt
-    os.write(2, b"at work\\n" if working else b"on the way\\n")
+def press(main=threading.get_ident()):
+    here = None
+    for count in range(3):
+        while True:
+            time.sleep(0.001)
+            frame = sys._current_frames()[main]
+            before, here = here, (frame, frame.f_lasti)
+            if {at_work}:
+                break
+        os.kill(os.getpid(), signal.SIGINT)
+        while looks == count:
+            time.sleep(0.001)
 signal.signal(signal.SIGINT, on_signal)
+threading.Thread(target=press, daemon=True).start()
 """
 
 
@@ -51,27 +62,15 @@ def started(code, *arguments):
             process.kill()
 
 
-def interrupt(process):
-    """Send Ctrl-C until the process was at work three times; two of them it has only looked at."""
-    seen = 0
-    while seen < 2:
-        process.send_signal(signal.SIGINT)
-        said = process.stderr.readline()
-        assert said in ("at work\n", "on the way\n")
-        seen += said == "at work\n"
-    process.send_signal(signal.SIGINT)
-
-
 def assert_interrupts(setup, call):
     """Run statements, then a call, in a new process; Ctrl-C must end it.
 
-    It is at work where two looks find it at the same place, which is a call of compiled code, or in
+    It is at work where it is found at the same place again, which is a call of compiled code, or in
     what that calls.
     """
     code = f"""\
 {textwrap.dedent(setup)}
-{handler("called(frame) or here == last")}
-print("ready", flush=True)
+{interrupts("called(frame) or here == before")}
 try:
     {call}
 except KeyboardInterrupt:
@@ -80,7 +79,5 @@ else:
     print("finished", flush=True)
 """
     with started(code) as process:
-        assert process.stdout.readline() == "ready\n"
-        interrupt(process)
         assert process.communicate() == ("interrupted\n", "")
         assert process.returncode == 0

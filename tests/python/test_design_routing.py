@@ -56,8 +56,8 @@ def test_random_holes_are_found_by_few_evaluations():
         holes = (draw.integers(12) + np.cumsum(draw.integers(-2, 3, 10))) % 12
         shape = routed([holes.tolist()], [-LENGTH * draw.uniform(0.02, 0.08)])
         answer = design.routing(blank(), shape.positions).require()
-        print(answer.evaluations, answer.iterations)
-        assert answer.evaluations < 1
+        # 3,168 to 6,597: in `make bench` a few hundredths of a second.
+        assert answer.evaluations < 10_000
         assert answer.holes == (tuple(holes.tolist()),)
 
 

@@ -307,7 +307,7 @@ def test_the_callback_sees_every_iteration_and_may_stop():
 
 def test_progress_is_told_up_to_the_end():
     told = []
-    settings = pso.PsoSettings(max_iterations=10**9, stagnation=None)
+    settings = pso.PsoSettings(max_iterations=10**6, stagnation=None)
     keywords = {"settings": settings, "vectorized": True, "progress": told.append}
     # Ends when it was told three times.
     found = pso.minimize(spheres, LOWER, UPPER, callback=lambda *_: len(told) == 3, **keywords)
@@ -361,7 +361,7 @@ def test_other_threads_run_meanwhile():
         _thread.interrupt_main()
 
     thread = threading.Thread(target=ends_it)
-    settings = pso.PsoSettings(particles=10, max_iterations=10**8, stagnation=None)
+    settings = pso.PsoSettings(particles=1000, max_iterations=10**6, stagnation=None)
     thread.start()
     # In C, and so never interrupted by the interpreter.
     with pytest.raises(KeyboardInterrupt):

@@ -7,8 +7,8 @@ use tdcr::Status;
 use tdcr::model::Model;
 use tdcr::obstacle::{Fault, Obstacle, SignedDistance};
 use tdcr::robot::{Robot, Routing, Tendon};
-use tdcr::rod::contact::{LoadedRod, Workspace as Loaded};
-use tdcr::rod::{Plan, Rod, RodSettings, TendonRule, Workspace};
+use tdcr::rod::contact::{LoadedRod, Scratch as Loaded};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch, TendonRule};
 
 use crate::common::robot;
 use crate::contact_common::{Case, V};
@@ -25,7 +25,7 @@ fn a_flag_that_is_set_ends_every_kind_of_solve() {
         let plan = Plan::new(&robot, RodSettings { tendons, ..Default::default() }).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
         let rod = Rod::new(&robot, &plan).stopped_by(Arc::clone(&stop));
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let free = rod.solve(&[-0.004], &mut work).unwrap();
         assert_eq!(free.status, Status::Converged);
         let frames = rod.state(&work).frames.clone();
@@ -54,7 +54,7 @@ fn a_large_solve_ends_within_one_evaluation() {
     let robot = helix(200);
     let plan = Plan::new(&robot, RodSettings { elements: 80, ..Default::default() }).unwrap();
     let rod = Rod::new(&robot, &plan).stopped_by(Arc::new(AtomicBool::new(true)));
-    let report = rod.solve(&[-0.01], &mut Workspace::default()).unwrap();
+    let report = rod.solve(&[-0.01], &mut Scratch::default()).unwrap();
     assert_eq!((report.status, report.iterations), (Status::IterationLimit, 0));
 }
 
