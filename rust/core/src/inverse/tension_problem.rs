@@ -266,10 +266,10 @@ mod tests {
 
     use super::super::InverseSettings;
     use super::super::Target;
+    use super::super::batch::Inverter;
     use super::super::bounds::Bounds;
     use super::super::position_goal::PlacesGoal;
     use super::super::rod::RodInverse;
-    use super::super::batch::Inverter;
     use super::*;
     use crate::lie::{Pose, so3};
     use crate::obstacle::{Obstacle, Sphere};
