@@ -9,7 +9,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use tdcr::constant_curvature::{
-    Arc, ConstantCurvature, ConstantCurvatureSettings, Length, Mapping, Plan, Workspace,
+    Arc, ConstantCurvature, ConstantCurvatureSettings, Length, Mapping, Plan, Scratch,
     displacements, frames, tip_derivative,
 };
 use tdcr::lie::Pose;
@@ -52,7 +52,7 @@ fn benches(c: &mut Criterion) {
     let plan = Plan::new(&robot, ConstantCurvatureSettings::default()).unwrap();
     let model = ConstantCurvature::new(&robot, &plan);
     let given: Vec<f64> = displacements(&plan, &arcs).iter().copied().collect();
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     model.solve(&given, &mut work).unwrap();
     assert!((model.state(&work).frames[30].translation - tip.translation).amax() < 1e-14);
     group.bench_function("robot/9_tendons_30_disks", |b| {

@@ -13,7 +13,7 @@ use tdcr::Status;
 use tdcr::model::Model;
 use tdcr::obstacle::{Cylinder, Obstacle, Sphere};
 use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
-use tdcr::rod::contact::{LoadedRod, Loads, Scene, Workspace};
+use tdcr::rod::contact::{LoadedRod, Loads, Scene, Scratch};
 use tdcr::rod::{Plan, RodSettings};
 
 use prism::prism;
@@ -49,7 +49,7 @@ fn pull(c: &mut Criterion, name: &str, n: usize, obstacle: Obstacle, most: f64) 
     let plan = Plan::new(&robot, RodSettings::default()).unwrap();
     let scene = Scene::new(&robot, &plan, &[obstacle], None, 0.0).unwrap();
     let model = LoadedRod::new(&robot, &plan, &scene).unwrap();
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     let mut run = || {
         model.solve(&[0.0], &mut work).unwrap();
         for step in 1..=STEPS {
@@ -82,7 +82,7 @@ fn loads(c: &mut Criterion) {
         let loads = Loads { backbone_density: 6450.0, tip_force, ..Default::default() };
         let scene = Scene::new(&robot, &plan, &[], Some(&loads), 0.0).unwrap();
         let model = LoadedRod::new(&robot, &plan, &scene).unwrap();
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let free = [f64::INFINITY];
         assert_eq!(model.solve(&free, &mut work).unwrap().status, Status::Converged);
         group.throughput(Throughput::Elements(n as u64));

@@ -20,7 +20,7 @@ use rand_chacha::ChaCha8Rng;
 use tdcr::Status;
 use tdcr::batch::Control;
 use tdcr::constant_curvature::{
-    Arc, ConstantCurvature, ConstantCurvatureSettings, Plan, Workspace, displacements,
+    Arc, ConstantCurvature, ConstantCurvatureSettings, Plan, Scratch, displacements,
 };
 use tdcr::inverse::{
     Bounds, ConstantCurvatureInverse, InverseSettings, Inverter, Range, RodInverse, Target,
@@ -79,7 +79,7 @@ fn random_poses(count: usize, extensible: bool) -> Vec<Pose> {
 /// Solves targets one by one with a forward check of each; prints the quantiles of the times.
 fn check(name: &str, inverse: &ConstantCurvatureInverse<'_>, plan: &Plan, targets: &[Target]) {
     let model = ConstantCurvature::new(inverse.robot(), plan);
-    let (mut work, mut forward) = (inverse.workspace(), Workspace::default());
+    let (mut work, mut forward) = (inverse.workspace(), Scratch::default());
     let mut found = vec![0.0; 9];
     let mut times: Vec<f64> = Vec::new();
     for target in targets {
@@ -168,7 +168,7 @@ fn benches(c: &mut Criterion) {
 /// Tips of shapes with two of three tendons of every segment pulled.
 fn rod_tips(robot: &Robot, plan: &rod::Plan, count: usize) -> Vec<Pose> {
     let mut draws = ChaCha8Rng::seed_from_u64(4);
-    let (model, mut work) = (Rod::new(robot, plan), rod::Workspace::default());
+    let (model, mut work) = (Rod::new(robot, plan), rod::Scratch::default());
     let mut tip = || {
         let mut pull =
             |k: usize| if k.is_multiple_of(3) { 0.0 } else { draws.random_range(0.0..4400.0) };
@@ -187,7 +187,7 @@ fn rods(c: &mut Criterion) {
     let inverse =
         RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default()).unwrap();
     let tips = rod_tips(&robot, &plan, 64);
-    let (model, mut forward) = (Rod::new(&robot, &plan), rod::Workspace::default());
+    let (model, mut forward) = (Rod::new(&robot, &plan), rod::Scratch::default());
     let mut work = inverse.buffers(None);
     for posed in [true, false] {
         let of = |tip: &Pose| {

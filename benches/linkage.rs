@@ -15,7 +15,7 @@ use tdcr::Status;
 use tdcr::batch::{Control, Field, Key, pool, solve_rows};
 use tdcr::linkage::four_bar::FourBar;
 use tdcr::linkage::seven_bar::{Hole, SevenBar};
-use tdcr::linkage::{Linkage, LinkageSettings, Plan, Pose, Workspace};
+use tdcr::linkage::{Linkage, LinkageSettings, Plan, Pose, Scratch};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
 use tdcr::solve::sqp::{Ending, minimize};
@@ -95,7 +95,7 @@ fn chains(c: &mut Criterion) {
             let model = Linkage::new(&robot, &plan, LinkageSettings::default()).unwrap();
             let pull = 0.02 * n as f64;
             let displacements = [-0.06 * pull, -0.04 * pull];
-            let mut work = Workspace::default();
+            let mut work = Scratch::default();
             let report = model.solve(&displacements, &mut work).unwrap();
             assert_eq!(report.status, Status::Converged);
             for (k, path) in robot.paths().iter().enumerate() {

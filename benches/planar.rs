@@ -18,7 +18,7 @@ use tdcr::Status;
 use tdcr::batch::{Control, pool};
 use tdcr::planar::{
     AngleFunction, Circle, Goal, InverseSettings, SwarmInverse, SwarmSettings, SwarmSolver, Trunk,
-    TwoSections, Unknowns, Word, inverse, solve_many,
+    TwoSections, Unknowns, WatchDecision, inverse, solve_many,
 };
 use tdcr::solve::pso::{PsoSettings, Topology};
 
@@ -103,7 +103,7 @@ fn rest(c: &mut Criterion) {
 }
 
 fn one(solver: &mut SwarmSolver<'_>, goal: &Goal, seed: u64) -> SwarmInverse {
-    solver.solve(goal, seed, &mut |_| Word::GoOn).unwrap().unwrap()
+    solver.solve(goal, seed, &mut |_| WatchDecision::GoOn).unwrap().unwrap()
 }
 
 fn swarm(c: &mut Criterion) {

@@ -15,7 +15,7 @@ use tdcr::batch::{Control, Field, Key, pool, solve_rows};
 use tdcr::lie::Pose;
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Workspace};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch};
 
 const FREE: f64 = f64::INFINITY;
 const RADIUS: f64 = 8e-3;
@@ -51,7 +51,7 @@ fn plan(robot: &Robot) -> Plan {
 
 /// Lengths that tensions lead to; tendons without tension are released by 5 mm more, or free.
 fn pulls(rod: &Rod<'_>, tensions: &[f64], release: f64) -> Vec<f64> {
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     let report = rod.solve_tensions(tensions, &mut work).unwrap();
     assert_eq!(report.status, Status::Converged);
     let lengths = rod.state(&work).tendon_lengths.iter().zip(rod.rest_lengths());
@@ -80,7 +80,7 @@ fn cold(c: &mut Criterion) {
         ("three_segments_30/released", &nine, pulls(&nine, &TENSIONS, 5e-3)),
     ];
     let mut group = c.benchmark_group("rod/cold");
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     for (name, rod, pulls) in &cases {
         group.bench_function(*name, |b| b.iter(|| rod.solve(black_box(pulls), &mut work)));
     }
@@ -89,7 +89,7 @@ fn cold(c: &mut Criterion) {
 
 fn chains(c: &mut Criterion) {
     let mut group = c.benchmark_group("rod/chain");
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     for n in [10, 30, 100, 300, 1000] {
         let robot = helices(n, &[0.3, 2.0]);
         let plan = plan(&robot);
@@ -118,7 +118,7 @@ fn warm(c: &mut Criterion) {
     let rod = Rod::new(&robot, &plan);
     let path = path(&rod, 1000);
     let mut group = c.benchmark_group("rod/step_20");
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     for row in path.chunks_exact(2) {
         assert_eq!(rod.resume(row, &mut work).unwrap().status, Status::Converged);
     }
@@ -139,7 +139,7 @@ fn derivatives(c: &mut Criterion) {
     let plan = plan(&three);
     let rod = Rod::new(&three, &plan);
     let pulls = pulls(&rod, &TENSIONS, FREE);
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     let mut group = c.benchmark_group("rod/three_segments_30");
     group.bench_function("solve", |b| b.iter(|| rod.solve(black_box(&pulls), &mut work)));
     rod.solve(&pulls, &mut work).unwrap();
@@ -149,9 +149,9 @@ fn derivatives(c: &mut Criterion) {
     let jacobian = rod.sensitivity(&pulls, &work).jacobian(&tool);
     let mut moved = pulls.clone();
     moved[0] -= step;
-    let mut other = Workspace::default();
+    let mut other = Scratch::default();
     rod.solve(&moved, &mut other).unwrap();
-    let tip = |work: &Workspace| rod.state(work).frames[30].translation;
+    let tip = |work: &Scratch| rod.state(work).frames[30].translation;
     let slope = (tip(&work) - tip(&other)) / step;
     assert!((slope - jacobian.fixed_view::<3, 1>(0, 0)).norm() < 1e-3 * slope.norm());
     group.bench_function("jacobian", |b| {

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix4, Rotation3, Vector2, Vector3};
 use tdcr::constant_curvature::{
-    Arc, ConstantCurvature, ConstantCurvatureSettings, Coupling, Plan, Workspace, displacements,
+    Arc, ConstantCurvature, ConstantCurvatureSettings, Coupling, Plan, Scratch, displacements,
 };
 use tdcr::lie::so3;
 use tdcr::model::Model;
@@ -61,7 +61,7 @@ fn robots_reproduce_their_arcs_in_both_readings() {
             .collect();
         let given: Vec<f64> = displacements(&plan, &arcs).iter().copied().collect();
         let model = ConstantCurvature::new(&robot, &plan);
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let report = model.solve(&given, &mut work).unwrap();
         assert_eq!(report.status, Status::Converged);
         assert!(report.residual < 1e-14, "{}", report.residual);
@@ -115,7 +115,7 @@ fn free_and_single_released_tendons_do_not_count() {
     assert!((shape.state.strains[0].y - 0.04).abs() < 1e-14);
     let plan = Plan::new(&three, settings).unwrap();
     let model = ConstantCurvature::new(&three, &plan);
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     // One workspace through changing patterns gives what fresh ones give.
     for pattern in [
         [-0.004, FREE, FREE],
@@ -153,7 +153,7 @@ fn the_tip_jacobian_agrees_with_differences() {
         if case % 5 == 0 && !extensible {
             given[4] = FREE;
         }
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let jacobian = model.jacobian(&given, &mut work).unwrap();
         let tip =
             |given: &[f64]| model.shape(given).unwrap().state.frames[30].compose(robot.tool());
@@ -215,10 +215,10 @@ fn overflow_is_told() {
             assert_eq!(shape.report.status, Status::NumericalError, "{given:?}");
             assert!(shape.message.contains("segment 0 overflow"), "{}", shape.message);
             assert!(shape.report.residual.is_infinite());
-            let error = model.jacobian(&given, &mut Workspace::default()).unwrap_err();
+            let error = model.jacobian(&given, &mut Scratch::default()).unwrap_err();
             assert_eq!(error.argument, "displacements");
         }
-        let error = model.jacobian(&[-0.25; 3], &mut Workspace::default());
+        let error = model.jacobian(&[-0.25; 3], &mut Scratch::default());
         assert_eq!(error.is_err(), extensible);
     }
 }

@@ -5,7 +5,7 @@ use tdcr::lie::Pose;
 use tdcr::model::Model;
 use tdcr::obstacle::{Cylinder, Obstacle, Sphere};
 use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
-use tdcr::rod::contact::{LoadedRod, Workspace};
+use tdcr::rod::contact::{LoadedRod, Scratch};
 use tdcr::{Shape, Status};
 
 use crate::contact_common::{Case, V};
@@ -95,7 +95,7 @@ fn the_papers_cylinder() {
     let plan = case.plan();
     let scene = case.scene(&plan);
     let model = LoadedRod::new(&case.robot, &plan, &scene).unwrap();
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     let mut touched = false;
     let mut first = None;
     for step in 1..=20 {

@@ -11,8 +11,8 @@ use tdcr::lie::so3;
 use tdcr::model::Model;
 use tdcr::obstacle::{Capsule, Cuboid, Cylinder, HalfSpace, Obstacle, Sphere};
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::contact::{LoadedRod, Workspace};
-use tdcr::rod::{Rod, Workspace as RodWorkspace};
+use tdcr::rod::contact::{LoadedRod, Scratch};
+use tdcr::rod::{Rod, Scratch as RodScratch};
 use tdcr::{Shape, Status};
 
 use crate::contact_common::{Case, V};
@@ -138,7 +138,7 @@ fn scene(seed: u64) -> Option<Drawn> {
     let mut case = Case::new(robot);
     let plan = case.plan();
     let rod = Rod::new(&case.robot, &plan);
-    let mut work = RodWorkspace::default();
+    let mut work = RodScratch::default();
     let report = rod.solve_tensions(&tensions, &mut work).unwrap();
     if report.status != Status::Converged {
         return None;
@@ -246,7 +246,7 @@ fn many(count: usize, every: usize) -> f64 {
         let plan = drawn.case.plan();
         let scene = drawn.case.scene(&plan);
         let model = LoadedRod::new(&drawn.case.robot, &plan, &scene).unwrap();
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let begin = Instant::now();
         let report = model.solve(&drawn.pulls, &mut work).unwrap();
         times.push(begin.elapsed().as_secs_f64() * 1e3);

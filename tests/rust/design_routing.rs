@@ -11,7 +11,7 @@ use tdcr::design::{Optimality, RoutingSettings, routing, routing_stopped_by};
 use tdcr::inverse::Range;
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Workspace};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch};
 
 const PIECE: f64 = 0.02;
 
@@ -111,7 +111,7 @@ fn brute(places: &[Vector3<f64>], count: usize) -> f64 {
         let own = robot(places.len(), &[holes.collect()], count);
         let plan = Plan::new(&own, RodSettings::default()).unwrap();
         let rod = Rod::new(&own, &plan);
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let mut value = |tension: f64| {
             let report = rod.solve_tensions(&[tension], &mut work).unwrap();
             if report.status != Status::Converged {

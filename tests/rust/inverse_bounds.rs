@@ -310,7 +310,7 @@ fn odd_robots_reach_what_their_tendons_can() {
                 // Arcs of displacements that tendons can have: only the pulled bend one-tendon segments.
                 let given = DVector::from_fn(count, |_, _| u(-0.01, 0.0));
                 let model = tdcr::constant_curvature::ConstantCurvature::new(robot, &plan);
-                let mut forward = tdcr::constant_curvature::Workspace::default();
+                let mut forward = tdcr::constant_curvature::Scratch::default();
                 tdcr::model::Model::solve(&model, given.as_slice(), &mut forward).unwrap();
                 let made = forward.arcs().to_vec();
                 let exact = displacements(&plan, &made);

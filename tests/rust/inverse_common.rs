@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tdcr::Status;
 use tdcr::constant_curvature::{
-    Arc, ConstantCurvature, ConstantCurvatureSettings, Plan, Workspace, displacements,
+    Arc, ConstantCurvature, ConstantCurvatureSettings, Plan, Scratch, displacements,
 };
 use tdcr::inverse::{Bounds, Range, Target};
 use tdcr::lie::{Pose, so3};
@@ -115,7 +115,7 @@ pub(crate) fn tool_of(robot: &Robot, plan: &Plan, arcs: &[Arc]) -> Pose {
 /// Where the forward model puts the tool.
 pub(crate) fn tool(robot: &Robot, plan: &Plan, displacements: &[f64]) -> Pose {
     let model = ConstantCurvature::new(robot, plan);
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     let report = model.solve(displacements, &mut work).unwrap();
     assert_eq!(report.status, Status::Converged);
     assert!(report.residual < 1e-12, "{}", report.residual);

@@ -7,7 +7,7 @@ use tdcr::lie::so3;
 use tdcr::model::Model;
 use tdcr::obstacle::{Cuboid, Cylinder, HalfSpace, Obstacle, Sphere};
 use tdcr::robot::Robot;
-use tdcr::rod::contact::{LoadedRod, Scene, Workspace};
+use tdcr::rod::contact::{LoadedRod, Scene, Scratch};
 use tdcr::rod::{Plan, RodSettings};
 
 use crate::inverse_common::uniform;
@@ -33,7 +33,7 @@ fn obstacle(at: &V, size: f64, u: &mut impl FnMut(f64, f64) -> f64) -> Obstacle 
 
 /// Displacements from rest.
 fn from_rest(rod: &LoadedRod<'_>, displacements: &[f64]) -> (Status, V) {
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     let report = rod.solve(displacements, &mut work).unwrap();
     (report.status, rod.state(&work).frames.last().unwrap().translation)
 }
@@ -55,7 +55,7 @@ fn a_trunk_that_has_to_lean_reaches_its_targets() {
         let obstacles = [obstacle(&at, LENGTH, &mut u)];
         let scene = Scene::new(&robot, &plan, &obstacles, None, 0.0).unwrap();
         let rod = LoadedRod::new(&robot, &plan, &scene).unwrap();
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let report = rod.solve_tensions(&tensions, &mut work).unwrap();
         let touches = rod.state(&work).contacts.iter().any(|c| c.force.norm() > 0.0);
         if report.status != Status::Converged || !touches {

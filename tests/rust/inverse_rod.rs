@@ -6,7 +6,7 @@ use std::time::Instant;
 use nalgebra::Vector3;
 use tdcr::batch::Control;
 use tdcr::inverse::{
-    Bounds, InverseSettings, Inverter, Range, RodInverse, RodWorkspace, Target, invert_path,
+    Bounds, InverseSettings, Inverter, Range, RodInverse, RodScratch, Target, invert_path,
 };
 use tdcr::lie::{Pose, so3};
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
@@ -76,13 +76,13 @@ fn inverse_of<'a>(
     RodInverse::new(robot, plan, bounds, settings).unwrap()
 }
 
-fn displacements_of(inverse: &RodInverse<'_>, work: &RodWorkspace<'_>) -> Vec<f64> {
+fn displacements_of(inverse: &RodInverse<'_>, work: &RodScratch<'_>) -> Vec<f64> {
     let mut displacements = vec![0.0; inverse.robot().tendons().len()];
     inverse.write_displacements(work, &mut displacements);
     displacements
 }
 
-fn tensions_of(inverse: &RodInverse<'_>, work: &RodWorkspace<'_>) -> Vec<f64> {
+fn tensions_of(inverse: &RodInverse<'_>, work: &RodScratch<'_>) -> Vec<f64> {
     let mut tensions = vec![0.0; inverse.robot().tendons().len()];
     inverse.write_tensions(work, &mut tensions);
     tensions
@@ -377,7 +377,7 @@ fn freedom_goes_to_the_least_tensions() {
         let any = InverseSettings { least_energy: false, ..InverseSettings::default() };
         let any = inverse_of(&robot, &plan, &Bounds::default(), any);
         let (mut work, mut other) = (least.buffers(None), any.buffers(None));
-        let sum = |inverse: &RodInverse<'_>, work: &RodWorkspace<'_>| -> f64 {
+        let sum = |inverse: &RodInverse<'_>, work: &RodScratch<'_>| -> f64 {
             tensions_of(inverse, work).iter().map(|t| t * t).sum()
         };
         let mut u = uniform(11);

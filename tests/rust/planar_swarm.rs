@@ -12,7 +12,7 @@ use tdcr::Status;
 use tdcr::batch::{Control, pool};
 use tdcr::planar::{
     Circle, Goal, InverseSettings, Row, SwarmInverse, SwarmSettings, SwarmSolver, Trunk,
-    TwoSections, Unknowns, Word, inverse, polish, solve_rows,
+    TwoSections, Unknowns, WatchDecision, inverse, polish, solve_rows,
 };
 use tdcr::solve::pso::{Progress, PsoSettings, Topology};
 
@@ -41,7 +41,7 @@ pub(crate) fn solve(
     seed: u64,
 ) -> SwarmInverse {
     let mut solver = SwarmSolver::new(trunk, circles, settings).unwrap();
-    solver.solve(goal, seed, &mut |_| Word::GoOn).unwrap().unwrap()
+    solver.solve(goal, seed, &mut |_| WatchDecision::GoOn).unwrap().unwrap()
 }
 
 fn ring() -> SwarmSettings {
@@ -70,7 +70,9 @@ fn every_seed_reaches_the_path_of_the_paper() {
             let mut hits = vec![0; exact.len()];
             let begin = Instant::now();
             let found: Vec<_> = (0..1000)
-                .map(|seed| solver.solve(&to(aim), seed, &mut |_| Word::GoOn).unwrap().unwrap())
+                .map(|seed| {
+                    solver.solve(&to(aim), seed, &mut |_| WatchDecision::GoOn).unwrap().unwrap()
+                })
                 .collect();
             let time = begin.elapsed();
             for (seed, got) in found.iter().enumerate() {
@@ -263,15 +265,15 @@ fn whoever_watches_ends_it() {
     let mut moves = 0;
     let mut watch = |progress: &Progress| {
         moves = progress.iteration;
-        if progress.iteration == 7 { Word::Finish } else { Word::GoOn }
+        if progress.iteration == 7 { WatchDecision::Finish } else { WatchDecision::GoOn }
     };
     let got = solver.solve(&far, 3, &mut watch).unwrap().unwrap();
     assert_eq!((moves, got.moves, got.swarms), (7, 7, 1));
     assert_eq!(got.inverse.status, Status::IterationLimit);
-    assert!(solver.solve(&far, 3, &mut |_| Word::Abandon).unwrap().is_none());
+    assert!(solver.solve(&far, 3, &mut |_| WatchDecision::Abandon).unwrap().is_none());
     // What the watcher ends is polished first.
     let near = to(Vector2::new(0.2, 0.06));
-    let got = solver.solve(&near, 3, &mut |_| Word::Finish).unwrap().unwrap();
+    let got = solver.solve(&near, 3, &mut |_| WatchDecision::Finish).unwrap().unwrap();
     assert_eq!((got.moves, got.inverse.status), (0, Status::Converged));
 }
 
@@ -288,7 +290,8 @@ fn bad_settings_name_the_argument() {
     let swarm = PsoSettings { particles: 0, ..PsoSettings::default() };
     assert_eq!(name(SwarmSettings { swarm, ..fine }), "particles");
     let mut solver = SwarmSolver::new(&trunk, &[], &fine).unwrap();
-    let mut bad = |goal: &Goal| solver.solve(goal, 0, &mut |_| Word::GoOn).unwrap_err().argument;
+    let mut bad =
+        |goal: &Goal| solver.solve(goal, 0, &mut |_| WatchDecision::GoOn).unwrap_err().argument;
     let goal = to(Vector2::new(0.1, 0.1));
     assert_eq!(bad(&to(Vector2::new(f64::NAN, 0.1))), "x");
     assert_eq!(bad(&Goal { limits: vec![7.0], ..goal.clone() }), "limit");

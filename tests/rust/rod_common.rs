@@ -7,7 +7,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Workspace};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch};
 use tdcr::{Shape, Status};
 
 pub(crate) fn rod_shape(robot: &Robot, settings: RodSettings, displacements: &[f64]) -> Shape {
@@ -38,7 +38,7 @@ pub(crate) fn try_under(
 ) -> Option<(Shape, Vec<f64>)> {
     let plan = Plan::new(robot, settings).unwrap();
     let rod = Rod::new(robot, &plan);
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     let report = rod.solve_tensions(tensions, &mut work).unwrap();
     let shape = rod.result(&[], report, work);
     let lengths = shape.state.tendon_lengths.iter().zip(rod.rest_lengths());

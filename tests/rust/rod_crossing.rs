@@ -9,7 +9,7 @@ use tdcr::Status;
 use tdcr::lie::so3;
 use tdcr::model::Model;
 use tdcr::robot::{PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Subsegment, TendonRule, Workspace};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch, Subsegment, TendonRule};
 
 use crate::common::robot;
 
@@ -120,7 +120,7 @@ fn both_mirror_images_have_the_same_energy() {
         for w in &mut mirrored.strains {
             *w = -*w;
         }
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let report = rod.solve_from(&mirrored, &pull, &mut work).unwrap();
         assert_eq!(report.status, Status::Converged);
         let other = rod.state(&work);

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Subsegment, TendonRule, Workspace};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch, Subsegment, TendonRule};
 use tdcr::{InvalidInput, Shape, Status};
 
 use crate::common::{FREE, robot, straight};
@@ -109,7 +109,7 @@ fn released_tendons_are_slack() {
         let alone = solved(&trunk, default(), &[-pull, FREE, FREE, FREE]);
         let plan = Plan::new(&trunk, default()).unwrap();
         let rod = Rod::new(&trunk, &plan);
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         for release in [1.1 * pull, 0.1, LENGTH, 3.0 * LENGTH, 1e3 * LENGTH, 1e14, 1e300] {
             let shape = solved(&trunk, default(), &[-pull, release, release, release]);
             assert!(apart(&shape, &alone) < 1e-9 * LENGTH);
@@ -272,7 +272,7 @@ fn input_that_makes_no_sense_is_refused() {
     }
     let plan = Plan::new(&trunk, default()).unwrap();
     let rod = Rod::new(&trunk, &plan);
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     for wrong in [&[1.0][..], &[1.0; 3], &[-1.0, 0.0], &[f64::NAN, 0.0], &[FREE, 0.0]] {
         assert_eq!(rod.solve_tensions(wrong, &mut work).unwrap_err().argument, "tensions");
     }

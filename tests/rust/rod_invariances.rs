@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tdcr::model::Model;
 use tdcr::robot::Robot;
-use tdcr::rod::{Plan, Rod, RodSettings, TendonRule, Workspace};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch, TendonRule};
 use tdcr::{Shape, Status};
 
 use crate::common::FREE;
@@ -238,7 +238,7 @@ fn slack_tendons_do_not_matter() {
         let robot = case.recipe.robot();
         let plan = Plan::new(&robot, tight()).unwrap();
         let rod = Rod::new(&robot, &plan);
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         for more in [1e-4, 0.01, 10.0] {
             let mut given = case.displacements.clone();
             for (k, d) in given.iter_mut().enumerate().filter(|(_, d)| !d.is_finite()) {

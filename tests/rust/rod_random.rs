@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use tdcr::Status;
 use tdcr::model::Model;
 use tdcr::robot::Robot;
-use tdcr::rod::{Plan, Rod, RodSettings, Workspace};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch};
 
 use crate::common::FREE;
 use crate::rod_common::Recipe;
@@ -58,7 +58,7 @@ impl Round {
         let robot = recipe.robot();
         let plan = Plan::new(&robot, RodSettings::default()).unwrap();
         let rod = Rod::new(&robot, &plan);
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let tensions = recipe.random_tensions(&mut draw, 6.0);
         if rod.solve_tensions(&tensions, &mut work).unwrap().status != Status::Converged {
             self.unstable += 1;
@@ -121,7 +121,7 @@ impl Arbitrary {
         let robot = recipe.robot();
         let plan = Plan::new(&robot, RodSettings::default()).unwrap();
         let rod = Rod::new(&robot, &plan);
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let mut displacement = |rest: &f64| match draw.random_range(0.0..1.0) {
             share if share < 0.15 => FREE,
             share if share < 0.3 => 0.0,
@@ -151,7 +151,7 @@ fn check_tendons(
     robot: &Robot,
     rod: &Rod<'_>,
     displacements: &[f64],
-    work: &Workspace,
+    work: &Scratch,
     recipe: &Recipe,
 ) {
     let state = rod.state(work);

@@ -7,7 +7,7 @@ use tdcr::Status;
 use tdcr::lie::Pose;
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Change, Plan, Rod, RodSettings, Subsegment, TendonRule, Workspace};
+use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch, Subsegment, TendonRule};
 
 /// What a robot is made of, as plain numbers that can be changed.
 #[derive(Clone)]
@@ -88,11 +88,11 @@ fn random_change(draw: &mut ChaCha8Rng, mut change: Change) -> Change {
 }
 
 /// Places, tensions and the tool's turn for a recipe.
-fn solved(recipe: &Recipe, settings: RodSettings, pulls: &[f64]) -> (Workspace, Robot) {
+fn solved(recipe: &Recipe, settings: RodSettings, pulls: &[f64]) -> (Scratch, Robot) {
     let robot = recipe.robot();
     let plan = Plan::new(&robot, settings).unwrap();
     let rod = Rod::new(&robot, &plan);
-    let mut work = Workspace::default();
+    let mut work = Scratch::default();
     let report = rod.solve(pulls, &mut work).unwrap();
     assert_eq!(report.status, Status::Converged, "{}", rod.message(pulls, &work));
     (work, robot)
@@ -142,7 +142,7 @@ fn changes_do_what_differences_say() {
                     pulls.iter().zip(&change.displacements).map(|(p, d)| p + share * d).collect();
                 solved(&recipe.changed(&change, share), settings, &moved).0
             };
-            let rod_state = |work: &Workspace, robot: &Robot, plan: &Plan| {
+            let rod_state = |work: &Scratch, robot: &Robot, plan: &Plan| {
                 Rod::new(robot, plan).state(work).clone()
             };
             let (plus, minus) = (at(step), at(-step));

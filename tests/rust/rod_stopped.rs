@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use tdcr::Status;
 use tdcr::model::Model;
 use tdcr::robot::{Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, TendonRule, Workspace};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch, TendonRule};
 
 use crate::common::robot;
 
@@ -24,7 +24,7 @@ fn a_flag_that_is_set_ends_every_kind_of_solve() {
         let plan = Plan::new(&robot, RodSettings { tendons, ..Default::default() }).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
         let rod = Rod::new(&robot, &plan).stopped_by(Arc::clone(&stop));
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let free = rod.solve(&[-0.004], &mut work).unwrap();
         assert_eq!(free.status, Status::Converged);
         let frames = rod.state(&work).frames.clone();
@@ -54,7 +54,7 @@ fn a_large_solve_ends_within_one_evaluation() {
     let stop = Arc::new(AtomicBool::new(false));
     let rod = Rod::new(&robot, &plan).stopped_by(Arc::clone(&stop));
     let (report, waited) = thread::scope(|scope| {
-        let solve = scope.spawn(|| rod.solve(&[-0.01], &mut Workspace::default()).unwrap());
+        let solve = scope.spawn(|| rod.solve(&[-0.01], &mut Scratch::default()).unwrap());
         thread::sleep(Duration::from_millis(50));
         let begin = Instant::now();
         stop.store(true, Ordering::Relaxed);

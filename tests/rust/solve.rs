@@ -1,8 +1,8 @@
 //! Regions, nearest points and least energies, against their own definitions.
 
 use nalgebra::{DVector, Matrix4, SVector};
-use tdcr::solve::fit::{self, Ending, Problem, Purpose};
-use tdcr::solve::region::{Disc, Region, Restoring};
+use tdcr::solve::convex_region::{Disc, Region, Restoring};
+use tdcr::solve::levenberg_marquardt::{self, Ending, Problem, Purpose};
 
 use crate::inverse_common::uniform;
 use crate::optimality::unheld;
@@ -205,7 +205,7 @@ fn active_normals(z: &[f64]) -> Vec<DVector<f64>> {
 fn nearest_points_and_least_energies_are_stationary() {
     let mut u = uniform(43);
     let region = small_region();
-    let mut work = fit::Workspace::<3>::default();
+    let mut work = levenberg_marquardt::Scratch::<3>::default();
     let (mut met, mut stalled, mut lowest, mut active, mut limits) = (0, 0, 0, 0, 0);
     let mut worst = (0.0_f64, 0.0_f64);
     for case in 0..4000 {

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tdcr::solve::bounded::Bounded;
+use tdcr::solve::bounded_program::Bounded;
 
 #[test]
 fn answers_meet_the_conditions_of_optimality() {

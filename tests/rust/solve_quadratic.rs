@@ -1,7 +1,7 @@
 //! Quadratic programs against the enumeration of all active sets.
 
 use nalgebra::{DMatrix, DVector};
-use tdcr::solve::quadratic::{Outcome, Quadratic, Rows};
+use tdcr::solve::quadratic_program::{Outcome, Quadratic, Rows};
 
 use crate::inverse_common::uniform;
 

@@ -28,10 +28,10 @@
 #![forbid(unsafe_code)]
 
 pub mod batch;
-mod bits;
 pub mod constant_curvature;
 pub mod design;
 pub mod error;
+mod hashing;
 pub mod inverse;
 pub mod lie;
 pub mod linkage;
@@ -40,10 +40,10 @@ pub mod obstacle;
 pub mod planar;
 pub mod robot;
 pub mod rod;
-mod shape;
+
 pub mod solve;
 mod status;
 
 pub use error::InvalidInput;
-pub use shape::{Contact, PointKind, Shape};
+pub use model::{Contact, PointKind, Shape};
 pub use status::Status;

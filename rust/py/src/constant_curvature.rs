@@ -11,8 +11,8 @@ use tdcr::constant_curvature::{Arc, Length, Mapping, Pattern, frames, tip_deriva
 use tdcr::lie::Pose;
 use tdcr::robot::rigid_motion;
 
-use crate::convert::{float_array, frozen, invalid, matrix4, values, wrong_shape};
-use crate::long_call;
+use crate::convert::arrays::{float_array, frozen, invalid, matrix4, values, wrong_shape};
+use crate::convert::interruptible;
 
 /// Rows up to which a call ends soon enough to go without listening for Ctrl-C.
 const SOON: usize = 10_000;
@@ -73,7 +73,7 @@ fn run<T: Send>(
     job: impl FnOnce(&Control) -> T + Send,
 ) -> PyResult<T> {
     if rows > SOON {
-        long_call::run(py, None, job)
+        interruptible::run(py, None, job)
     } else {
         Ok(py.detach(|| job(&Control::default())))
     }
@@ -202,7 +202,7 @@ pub(crate) fn _arc_frames(
     base: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Py<PyAny>> {
     let arcs = arcs(kappa, phi, ell)?;
-    let points = crate::arguments::whole("points", points)?;
+    let points = crate::convert::arguments::whole("points", points)?;
     if points < 2 {
         let expected = "at least 2 frames per segment (base and tip)";
         return Err(invalid(&InvalidInput::new("points", expected, points)));

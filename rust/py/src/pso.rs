@@ -8,9 +8,9 @@ use pyo3::types::PyTuple;
 
 use tdcr::solve::pso::{Objective, Progress, Swarm};
 
-use crate::arguments::returned;
-use crate::convert::{float_array, frozen, invalid, status, values, wrong_shape};
-use crate::pso_settings::PsoSettings;
+use crate::convert::arguments::returned;
+use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
+use crate::settings::pso::PsoSettings;
 
 /// How often progress is told.
 const POLL: Duration = Duration::from_millis(50);

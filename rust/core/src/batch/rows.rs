@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::field::{Field, Key};
 use crate::error::InvalidInput;
+use crate::model::{Contact, Shape};
 use crate::model::{Model, Report, State};
 use crate::robot::Robot;
-use crate::shape::{Contact, Shape};
 use crate::status::Status;
 
 /// Stop flag and progress of a long call, shared with the thread that waits for it.
@@ -146,7 +146,7 @@ pub fn chained_shape<M: Model>(
     row: usize,
 ) -> Result<Shape, InvalidInput> {
     let tendons = model.robot().tendons().len();
-    let mut work = M::Workspace::default();
+    let mut work = M::Scratch::default();
     let first = row - row % ROWS_PER_CHAIN;
     let mut report = solve_row(model, displacements, first, None, &mut work)?;
     for next in first + 1..=row {
@@ -182,7 +182,7 @@ fn solve_all<M: Model>(
     let jobs = jobs(&mut columns, &mut reports, start);
     let done: Vec<_> = pool.install(|| {
         jobs.into_par_iter()
-            .map_init(M::Workspace::default, |work, job| {
+            .map_init(M::Scratch::default, |work, job| {
                 run(model, displacements, work, job, control, start, touching)
             })
             .collect()
@@ -218,7 +218,7 @@ fn jobs<'a>(columns: &'a mut [Column], reports: &'a mut [Report], start: Start) 
 fn run<M: Model>(
     model: &M,
     displacements: &[f64],
-    work: &mut M::Workspace,
+    work: &mut M::Scratch,
     mut job: Job<'_>,
     control: &Control,
     start: Start,
@@ -254,7 +254,7 @@ fn solve_row<M: Model>(
     displacements: &[f64],
     row: usize,
     before: Option<Status>,
-    work: &mut M::Workspace,
+    work: &mut M::Scratch,
 ) -> Result<Report, InvalidInput> {
     let tendons = model.robot().tendons().len();
     let own = &displacements[row * tendons..(row + 1) * tendons];

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6x3, Vector2, Vector3};
 
-use super::bent::Bent;
+use super::unit_arc::Bent;
 use crate::lie::Pose;
 
 /// An arc by its bending vector and its length. The bending vector `kappa * ell * (cos phi, sin phi)`

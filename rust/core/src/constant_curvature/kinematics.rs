@@ -3,7 +3,7 @@
 use nalgebra::Matrix6xX;
 
 use super::arc::Arc;
-use super::bent::Bent;
+use super::unit_arc::Bent;
 use crate::lie::Pose;
 
 /// Frames along a chain of arcs: `points` (at least 2) evenly spaced on each, its base and its tip

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, Vector2};
 
 use super::arc::Arc;
 use crate::error::{InvalidInput, finite, positive};
-use crate::solve::least_squares::PseudoInverse;
+use crate::solve::pseudo_inverse::PseudoInverse;
 
 /// How the length of the segment is found.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::arc::Arc;
 use crate::error::InvalidInput;
 use crate::robot::Robot;
-use crate::solve::least_squares::{PseudoInverse, null_space};
+use crate::solve::pseudo_inverse::{PseudoInverse, null_space};
 
 /// How displacements reach the segments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

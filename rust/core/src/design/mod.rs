@@ -1,15 +1,15 @@
 //! Design: which robot reaches a wanted shape. The mathematics is in `docs/design.md`.
 
-mod curve;
-mod descent;
-mod hindrance;
-mod march;
-mod nearest;
+mod bend_descent;
+mod feasibility;
+mod nearest_rod;
+mod points_on_curve;
 mod prebend;
 mod routing;
 mod settings;
+mod stepwise_tensions;
 
-pub use curve::{angle_at_base, points_on_curve};
+pub use points_on_curve::{angle_at_base, points_on_curve};
 pub use prebend::{Prebend, prebend, prebend_stopped_by};
 pub use routing::{Optimality, Routed, RoutingSettings, routing, routing_rows, routing_stopped_by};
 pub use settings::PrebendSettings;

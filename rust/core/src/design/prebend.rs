@@ -8,17 +8,17 @@ use std::sync::atomic::{AtomicBool, Ordering as Memory};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::bend_descent::{Bent, descend, within};
 use super::check_targets;
-use super::descent::{Bent, descend, within};
-use super::hindrance::hindrance;
-use super::march::march;
-use super::nearest::Chain;
+use super::feasibility::hindrance;
+use super::nearest_rod::Chain;
 use super::settings::PrebendSettings;
+use super::stepwise_tensions::march;
 use crate::error::InvalidInput;
 use crate::model::Model;
+use crate::model::Shape;
 use crate::robot::{Backbone, Robot};
-use crate::rod::{Plan, Rod, RodSettings, TendonRule, Workspace};
-use crate::shape::Shape;
+use crate::rod::{Plan, Rod, RodSettings, Scratch, TendonRule};
 use crate::status::Status;
 
 /// Share by which a sum of squares may be above the least before more is sought.
@@ -137,7 +137,7 @@ impl Design<'_> {
         let robot = self.with_rest(&rest)?;
         let plan = Plan::new(&robot, self.settings.rod)?;
         let rod = Rod::new(&robot, &plan).stopped_by(Arc::clone(self.stop));
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         let report = match near {
             Some(shape) => rod.solve_from(&shape.state, self.displacements, &mut work)?,
             None => rod.solve(self.displacements, &mut work)?,
@@ -344,7 +344,7 @@ impl Bent for Design<'_> {
         let n = self.targets.len();
         let plan = Plan::new(&candidate.robot, self.settings.rod)?;
         let rod = Rod::new(&candidate.robot, &plan);
-        let mut work = Workspace::default();
+        let mut work = Scratch::default();
         rod.solve_from(&candidate.shape.state, self.displacements, &mut work)?;
         let sensitivity = rod.sensitivity(self.displacements, &work);
         let mut out = DMatrix::zeros(3 * n + 2 * (n - 1), 2 * n);

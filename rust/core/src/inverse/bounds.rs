@@ -6,8 +6,8 @@ use nalgebra::DMatrix;
 
 use crate::constant_curvature::Plan;
 use crate::error::InvalidInput;
-use crate::solve::least_squares::null_space;
-use crate::solve::region::{Disc, Region};
+use crate::solve::convex_region::{Disc, Region};
+use crate::solve::pseudo_inverse::null_space;
 
 /// Lowest and highest values, one pair for all or one for each.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,32 +1,32 @@
 //! From where the tool should be to tendon displacements.
 //!
-//! [`ConstantCurvatureInverse`] finds the arcs by descents from many starts ([`crate::solve::fit`]),
+//! [`ConstantCurvatureInverse`] finds the arcs by descents from many starts ([`crate::solve::levenberg_marquardt`]),
 //! inside bounds, and spends what freedom is left on the least bending energy; [`RodInverse`] finds tensions
 //! likewise, none below zero, and spends it on the least of them.
 
-mod aim;
-mod answer;
+mod arc_problem;
+mod batch;
 mod bounds;
-mod cartesian;
-mod chain;
+mod cartesian_path;
 mod constant_curvature;
-mod places;
-mod pull;
+mod multistart;
+mod outcome;
+mod pose_goal;
+mod pose_residual;
+mod position_goal;
 mod rod;
-mod rows;
-mod search;
 mod settings;
-mod swarm;
-mod tool;
+mod swarm_starts;
+mod tension_problem;
 
 use nalgebra::{Matrix3, Vector3};
 
-pub use answer::Answer;
+pub use batch::{InverseRows, Inverter, invert_path, invert_rows};
 pub use bounds::{Bounds, Range};
-pub use cartesian::cartesian_path;
-pub use constant_curvature::{ConstantCurvatureInverse, Solution, Workspace};
-pub use rod::{Placed, RodInverse, RodWorkspace};
-pub use rows::{InverseRows, Inverter, invert_path, invert_rows};
+pub use cartesian_path::cartesian_path;
+pub use constant_curvature::{ConstantCurvatureInverse, Scratch, Solution};
+pub use outcome::Answer;
+pub use rod::{Placed, RodInverse, RodScratch};
 pub use settings::{InverseSettings, Method};
 
 use crate::error::InvalidInput;

@@ -1,14 +1,14 @@
 //! What stood in the way of a solve, in words.
 
-use super::chain::{Failure, Linkage, Workspace};
-use super::drive::{BOUND_TOLERANCE, Drive, Run};
+use super::driving_tendons::{BOUND_TOLERANCE, Drive, Run};
+use super::model::{Failure, Linkage, Scratch};
 use super::seven_bar::linear_bend;
 use super::subsegment::{BEND_MARGIN, Obstacle};
 use crate::solve::sqp::Ending;
 
 impl Linkage<'_> {
     /// What stood in the way of the last solve in `work`; empty when it converged.
-    pub(super) fn describe(&self, displacements: &[f64], work: &Workspace) -> String {
+    pub(super) fn describe(&self, displacements: &[f64], work: &Scratch) -> String {
         match work.failure {
             None => self.pushing(displacements, work),
             Some(Failure::Reach { disk, run, obstacle: Obstacle::Bend }) => {
@@ -74,7 +74,7 @@ impl Linkage<'_> {
 
     /// What a converged answer should still say: the linkage keeps both lengths, as in the paper, also
     /// where the second tendon would have to push.
-    fn pushing(&self, displacements: &[f64], work: &Workspace) -> String {
+    fn pushing(&self, displacements: &[f64], work: &Scratch) -> String {
         let choice = self.choice(displacements);
         let names = self.robot.tendon_names();
         for (run, drive) in self.plan.runs.iter().zip(&work.drives) {
@@ -93,7 +93,7 @@ impl Linkage<'_> {
         String::new()
     }
 
-    fn bound_message(&self, displacements: &[f64], work: &Workspace) -> String {
+    fn bound_message(&self, displacements: &[f64], work: &Scratch) -> String {
         let state = &work.state;
         let names = self.robot.tendon_names();
         let list = |tendons: &[usize]| {

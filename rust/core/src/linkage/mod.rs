@@ -6,15 +6,15 @@
 //! tendon's shortening is shared by its pieces in proportion to their rest lengths.
 
 mod angle;
-mod chain;
-mod drive;
+mod driving_tendons;
 pub mod four_bar;
 mod message;
+mod model;
 mod pose;
 pub mod seven_bar;
 mod subsegment;
 
-pub use chain::{Linkage, Plan, Workspace};
+pub use model::{Linkage, Plan, Scratch};
 pub use pose::Pose;
 pub use subsegment::{solve_four_bar, solve_seven_bar};
 

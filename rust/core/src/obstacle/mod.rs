@@ -17,7 +17,7 @@ pub use mesh::Mesh;
 pub use signed_distance::{DistanceFunction, Fault, SignedDistance, by_differences};
 pub use smooth::{Capsule, Cylinder, HalfSpace, Sphere};
 
-use crate::bits::{Bits, hash_by_bits};
+use crate::hashing::{Bits, hash_by_bits};
 use crate::lie::Pose;
 
 /// Points nearer to a centre, an axis or an edge than this have no direction away from it \[m\]: squares

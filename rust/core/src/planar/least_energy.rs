@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Vector3;
 
-use super::problem::{Problem, Work, eliminate};
+use super::tip_equations::{Problem, Work, eliminate};
 
 /// Largest gradient of the energy along the target that counts as none, over the energy's own.
 const STATIONARY: f64 = 1e-11;

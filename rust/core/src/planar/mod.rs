@@ -6,22 +6,23 @@
 //! finds every solution of two sections, [`inverse`] the one of least bending energy of any number,
 //! [`SwarmSolver`] one by particle swarm, among obstacles too.
 
+mod angle_function;
+mod batch;
 mod chord;
 mod clearance;
-mod inverse;
 mod least_energy;
-mod many;
-mod nearest;
-mod problem;
-mod spline;
+mod newton_inverse;
 mod swarm;
+mod tip_equations;
 mod trunk;
 mod two_section;
 
+pub use angle_function::{AngleFunction, Curve};
+pub use batch::{ManySolutions, inverse_rows, solve_many};
 pub use clearance::Circle;
-pub use inverse::{Goal, Inverse, InverseSettings, inverse, inverse_until, polish};
-pub use many::{ManySolutions, inverse_rows, solve_many};
-pub use spline::{AngleFunction, Curve};
-pub use swarm::{Row, Rows, SwarmInverse, SwarmSettings, SwarmSolver, Unknowns, Word, solve_rows};
+pub use newton_inverse::{Goal, Inverse, InverseSettings, inverse, inverse_until, polish};
+pub use swarm::{
+    Row, Rows, SwarmInverse, SwarmSettings, SwarmSolver, Unknowns, WatchDecision, solve_rows,
+};
 pub use trunk::{Bent, Cables, Trunk};
 pub use two_section::TwoSections;

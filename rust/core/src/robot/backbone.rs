@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::curve::rest_from_curve;
-use crate::bits::{Bits, hash_by_bits};
 use crate::error::{InvalidInput, finite, positive};
+use crate::hashing::{Bits, hash_by_bits};
 
 /// What a backbone is described by, before it is checked. See [`Backbone::new`].
 #[derive(Clone, Debug, PartialEq)]

@@ -10,8 +10,8 @@ pub use backbone::{Backbone, BackboneSpec};
 pub(crate) use curve::Spline;
 pub use tendon::{PerDisk, Routing, Tendon};
 
-use crate::bits::{Bits, hash_by_bits};
 use crate::error::{self, InvalidInput};
+use crate::hashing::{Bits, hash_by_bits};
 use crate::lie::{Pose, so3};
 
 /// A tendon as the robot sees it: where it ends and which hole it passes on each disk.

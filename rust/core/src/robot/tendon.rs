@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::bits::{Bits, hash_by_bits};
 use crate::error::{InvalidInput, finite, length, positive};
+use crate::hashing::{Bits, hash_by_bits};
 
 /// One value for all disks, or one per disk 0..end.
 #[derive(Clone, Debug, PartialEq)]

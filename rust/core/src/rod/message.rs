@@ -1,12 +1,12 @@
 //! What stood in the way of a solve, in a sentence.
 
-use super::ascent::Ending;
-use super::model::{Rod, Workspace};
+use super::dual_newton::Ending;
+use super::model::{Rod, Scratch};
 use super::plan::Plan;
 use super::settings::TendonRule;
 
 /// The message for displacements (or none, where tensions were given); empty when the solve converged.
-pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Workspace) -> String {
+pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Scratch) -> String {
     let (plan, state) = (rod.plan, &work.state);
     if work.ending == Ending::Converged {
         return String::new();

@@ -1,24 +1,23 @@
 //! The strain-energy rod: general routing, pre-bent backbones, any number of tendons.
 
-mod ascent;
-pub(crate) mod balance;
-mod chain;
 pub mod contact;
+mod degenerate_rest;
+mod dual_newton;
 pub(crate) mod element;
-pub(crate) mod march;
+pub(crate) mod equilibrium;
 mod message;
 mod model;
-mod nudge;
+mod newton_system;
+pub(crate) mod one_subsegment;
 mod plan;
 mod proportional;
-pub(crate) mod pulled;
 mod sensitivity;
 mod settings;
-pub(crate) mod stage;
+pub(crate) mod stepwise_inverse;
 mod subsegment;
-mod sweep;
+mod tip_rates;
 
-pub use model::{Rod, Workspace};
+pub use model::{Rod, Scratch};
 pub use plan::Plan;
 pub use sensitivity::{Change, Linearized, Sensitivity, Variation};
 pub use settings::{RodSettings, Subsegment, TendonRule};

@@ -5,10 +5,10 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
-use super::ascent::{Ascent, EASY, Ending};
-use super::chain::{Chain, JUMP, Left};
+use super::degenerate_rest;
+use super::dual_newton::{DualNewton, EASY, Ending};
 use super::message::message;
-use super::nudge;
+use super::newton_system::{Chain, JUMP, Left};
 use super::plan::Plan;
 use super::settings::TendonRule;
 use crate::error::InvalidInput;
@@ -19,7 +19,7 @@ use crate::status::Status;
 
 /// Buffers of a solve.
 #[derive(Clone, Debug, Default)]
-pub struct Workspace {
+pub struct Scratch {
     pub(super) state: State,
     pub(super) chain: Chain,
     /// One subsegment, where displacements are proportional.
@@ -27,7 +27,7 @@ pub struct Workspace {
     /// Tension of every piece, and the tendons that drive.
     pub(super) pulls: Vec<f64>,
     pub(super) drives: Vec<bool>,
-    pub(super) ascent: Ascent,
+    pub(super) ascent: DualNewton,
     pub(super) left: Left,
     pub(super) ending: Ending,
     /// Strains at the last load that was reached, where tensions are given.
@@ -62,7 +62,7 @@ impl<'r> Rod<'r> {
     }
 
     /// Hands the flag to the solve that begins.
-    fn listen(&self, work: &mut Workspace) {
+    fn listen(&self, work: &mut Scratch) {
         work.chain.stop.clone_from(&self.stop);
         work.part.stop.clone_from(&self.stop);
     }
@@ -94,7 +94,7 @@ impl<'r> Rod<'r> {
     pub fn solve_tensions(
         &self,
         tensions: &[f64],
-        work: &mut Workspace,
+        work: &mut Scratch,
     ) -> Result<Report, InvalidInput> {
         if self.plan.settings.tendons == TendonRule::Proportional {
             let expected = "sliding tendons where tensions are given";
@@ -137,7 +137,7 @@ impl<'r> Rod<'r> {
     }
 
     /// Newton's method under given tensions from the point at hand; whether it converged to a minimum.
-    fn settle(&self, work: &mut Workspace, budget: &mut usize) -> bool {
+    fn settle(&self, work: &mut Scratch, budget: &mut usize) -> bool {
         let mut moved = 0.0;
         for _ in 0..PATIENCE {
             work.left = work.chain.assemble(self.plan, EASY);
@@ -169,7 +169,7 @@ impl<'r> Rod<'r> {
         &self,
         start: &State,
         displacements: &[f64],
-        work: &mut Workspace,
+        work: &mut Scratch,
     ) -> Result<Report, InvalidInput> {
         work.chain.rest(self.plan);
         let Chain { strains, tensions, .. } = &mut work.chain;
@@ -179,7 +179,7 @@ impl<'r> Rod<'r> {
     }
 
     /// From the strains and tensions at hand to the displacements; evaluations that took.
-    fn ascend(&self, displacements: &[f64], work: &mut Workspace) -> usize {
+    fn ascend(&self, displacements: &[f64], work: &mut Scratch) -> usize {
         let plan = self.plan;
         work.chain.bound(plan, displacements);
         self.listen(work);
@@ -187,17 +187,17 @@ impl<'r> Rod<'r> {
             return self.solve_pieces(displacements, work);
         }
         let mut budget = plan.settings.max_iterations;
-        let Workspace { ascent, chain, .. } = work;
-        (work.ending, work.left) = nudge::climb(ascent, plan, chain, &mut budget);
+        let Scratch { ascent, chain, .. } = work;
+        (work.ending, work.left) = degenerate_rest::climb(ascent, plan, chain, &mut budget);
         plan.settings.max_iterations - budget
     }
 
     /// The solved quantities, and how the solve ended.
-    fn report(&self, work: &mut Workspace, evaluations: usize) -> Report {
+    fn report(&self, work: &mut Scratch, evaluations: usize) -> Report {
         if work.ending != Ending::Converged && work.chain.stopped() {
             work.ending = Ending::Stopped;
         }
-        let Workspace { state, chain, .. } = work;
+        let Scratch { state, chain, .. } = work;
         write_state(state, self, &chain.strains, &chain.ends, &chain.tensions);
         told(work.ending, work.left.worst(), evaluations)
     }
@@ -274,7 +274,7 @@ pub(super) fn told(ending: Ending, residual: f64, evaluations: usize) -> Report 
 }
 
 impl Model for Rod<'_> {
-    type Workspace = Workspace;
+    type Scratch = Scratch;
 
     fn robot(&self) -> &Robot {
         self.robot
@@ -288,13 +288,13 @@ impl Model for Rod<'_> {
         self.plan.settings.elements
     }
 
-    fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+    fn solve(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
         work.chain.rest(self.plan);
         let rounds = self.ascend(displacements, work);
         Ok(self.report(work, rounds))
     }
 
-    fn resume(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+    fn resume(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
         let starts = work.chain.tensions.len() == displacements.len();
         if starts && work.ending == Ending::Converged {
             let rounds = self.ascend(displacements, work);
@@ -305,15 +305,15 @@ impl Model for Rod<'_> {
         self.solve(displacements, work)
     }
 
-    fn state<'w>(&self, work: &'w Workspace) -> &'w State {
+    fn state<'w>(&self, work: &'w Scratch) -> &'w State {
         &work.state
     }
 
-    fn take_state(&self, work: Workspace) -> State {
+    fn take_state(&self, work: Scratch) -> State {
         work.state
     }
 
-    fn message(&self, displacements: &[f64], work: &Workspace) -> String {
+    fn message(&self, displacements: &[f64], work: &Scratch) -> String {
         message(self, displacements, work)
     }
 }

@@ -3,10 +3,10 @@
 //! Nothing ties subsegments together then. Each is solved by the same method as a whole rod, with its pieces
 //! as tendons whose lengths are equations and whose multipliers may have any sign.
 
-use super::ascent::Ending;
-use super::chain::{Chain, Left};
-use super::model::{Rod, Workspace};
-use super::nudge;
+use super::degenerate_rest;
+use super::dual_newton::Ending;
+use super::model::{Rod, Scratch};
+use super::newton_system::{Chain, Left};
 use super::plan::Plan;
 
 /// A held tendon stretches when it becomes longer by more than this share of itself.
@@ -15,9 +15,9 @@ const STRETCHED: f64 = 1e-10;
 impl Rod<'_> {
     /// Solves every subsegment from the strains and tensions at hand; the largest number of evaluations that
     /// one took.
-    pub(super) fn solve_pieces(&self, displacements: &[f64], work: &mut Workspace) -> usize {
+    pub(super) fn solve_pieces(&self, displacements: &[f64], work: &mut Scratch) -> usize {
         let plan = self.plan;
-        // Pulled tendons drive; one that is held joins them only if it would stretch.
+        // FreeRod tendons drive; one that is held joins them only if it would stretch.
         let mut drives: Vec<bool> = displacements.iter().map(|d| *d < 0.0).collect();
         let start = (work.chain.strains.clone(), work.chain.tensions.clone());
         let mut rounds = 0;
@@ -40,7 +40,7 @@ impl Rod<'_> {
         }
     }
 
-    fn solve_driven(&self, displacements: &[f64], drives: &[bool], work: &mut Workspace) -> usize {
+    fn solve_driven(&self, displacements: &[f64], drives: &[bool], work: &mut Scratch) -> usize {
         let (plan, width) = (self.plan, self.plan.width());
         // The base piece's tension is the first guess of all.
         let tensions = work.chain.tensions.iter().zip(drives);
@@ -59,7 +59,8 @@ impl Rod<'_> {
         for (i, own) in plan.parts.iter().enumerate() {
             work.load_part(plan, i, displacements, &mut part);
             let mut budget = plan.settings.max_iterations;
-            let (ending, left) = nudge::climb(&mut work.ascent, own, &mut part, &mut budget);
+            let (ending, left) =
+                degenerate_rest::climb(&mut work.ascent, own, &mut part, &mut budget);
             most = most.max(plan.settings.max_iterations - budget);
             if work.ending == Ending::Converged {
                 work.ending = ending;
@@ -85,7 +86,7 @@ impl Rod<'_> {
     }
 }
 
-impl Workspace {
+impl Scratch {
     /// Puts a subsegment as it is, with its share of the displacements, into a chain of its own.
     pub(super) fn load_part(&self, plan: &Plan, i: usize, displacements: &[f64], part: &mut Chain) {
         let (width, range) = (plan.width(), plan.starts[i]..plan.starts[i + 1]);

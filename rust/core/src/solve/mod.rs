@@ -1,10 +1,9 @@
 //! Solvers: they see functions, gradients and block structure, never robots.
 
-pub mod bounded;
-pub mod fit;
-mod least;
-pub mod least_squares;
+pub mod bounded_program;
+pub mod convex_region;
+pub mod levenberg_marquardt;
+pub mod pseudo_inverse;
 pub mod pso;
-pub mod quadratic;
-pub mod region;
+pub mod quadratic_program;
 pub mod sqp;

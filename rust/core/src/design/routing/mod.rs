@@ -1,22 +1,22 @@
 //! Routing design: the holes and pulls that bring a given backbone nearest to a wanted shape. The mathematics is
 //! in `docs/design.md`.
 
-mod beam;
-mod descent;
-mod design;
-mod every;
-mod fewer;
-mod judge;
-mod polish;
-mod posed;
-mod relax;
-mod search;
+mod beam_search;
+mod best_tensions;
+mod canonical_task;
+mod continuous_holes;
+mod evaluation;
+mod exhaustive;
+mod fewer_tendons;
+mod hole_descent;
+mod hole_search;
+mod quadratic_cost;
+mod result;
 mod settings;
+mod solver;
 mod starts;
-mod sums;
-mod table;
+mod subsegment_table;
 mod task;
-mod told;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,16 +25,16 @@ use nalgebra::Vector3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use self::fewer::Designs;
-use self::posed::{Posed, radii};
+use self::canonical_task::{Posed, radii};
+use self::fewer_tendons::Designs;
+use self::result::told;
 use self::task::Task;
-use self::told::told;
 use crate::batch::Control;
 use crate::error::InvalidInput;
 use crate::inverse::Range;
+use crate::model::Shape;
 use crate::robot::{Path, Robot};
 use crate::rod::Plan;
-use crate::shape::Shape;
 use crate::status::Status;
 
 pub use settings::RoutingSettings;

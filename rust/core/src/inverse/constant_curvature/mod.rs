@@ -7,28 +7,28 @@ use std::sync::{self, atomic::AtomicBool};
 
 use nalgebra::Vector2;
 
-use super::answer::{Answer, tell};
+use super::arc_problem::Chain;
+use super::batch::Inverter;
 use super::bounds::{Bounds, Reach};
-use super::chain::Chain;
-use super::rows::Inverter;
-use super::search::{Effort, Found, Freedom, Search};
+use super::multistart::{Effort, Found, Freedom, Search};
+use super::outcome::{Answer, tell};
 use super::{InverseSettings, Method, Target};
 use crate::constant_curvature::{self, Arc, ConstantCurvature, ConstantCurvatureSettings, Plan};
 use crate::error::InvalidInput;
 use crate::model::Model;
 use crate::robot::Robot;
-use crate::solve::fit::Problem;
+use crate::solve::levenberg_marquardt::Problem;
 use crate::status::Status;
 pub(super) use starts::arc_to;
 
 /// Buffers of a solve and the arcs it found.
 #[derive(Clone, Debug)]
-pub struct Workspace<'a> {
+pub struct Scratch<'a> {
     chain: Chain<'a>,
     search: Search<'a>,
 }
 
-impl<'a> Workspace<'a> {
+impl<'a> Scratch<'a> {
     /// Ends solves before their next start when the flag is set.
     #[must_use]
     pub fn stopped_by(mut self, stop: &'a AtomicBool) -> Self {
@@ -81,7 +81,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         &self,
         target: &Target,
         k: usize,
-        work: &mut Workspace<'_>,
+        work: &mut Scratch<'_>,
         bends: &mut Vec<Vector2<f64>>,
     ) {
         work.chain.aim.at(*target);
@@ -112,20 +112,15 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// Buffers for this inverse.
     #[must_use]
-    pub fn workspace(&self) -> Workspace<'_> {
-        Workspace {
+    pub fn workspace(&self) -> Scratch<'_> {
+        Scratch {
             chain: Chain::new(self.robot, &self.plan, &self.settings),
             search: Search::default(),
         }
     }
 
     /// Seeks arcs that bring the tool to `target`; first from `start`, if given.
-    pub fn solve(
-        &self,
-        target: &Target,
-        start: Option<&[Arc]>,
-        work: &mut Workspace<'_>,
-    ) -> Answer {
+    pub fn solve(&self, target: &Target, start: Option<&[Arc]>, work: &mut Scratch<'_>) -> Answer {
         work.chain.aim.at(*target);
         let effort = self.effort(&work.chain, self.settings.starts);
         let usable = |arcs: &&[Arc]| {
@@ -144,7 +139,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// Seeks again from where the last solve in `work` ended, as along a path; from other starts only when
     /// that fails.
-    pub fn follow(&self, target: &Target, work: &mut Workspace<'_>) -> Answer {
+    pub fn follow(&self, target: &Target, work: &mut Scratch<'_>) -> Answer {
         if work.search.point.len() != self.reach.space.region.size() {
             return self.solve(target, None, work);
         }
@@ -167,7 +162,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// The same in given buffers.
     #[must_use]
-    pub fn solutions_in(&self, target: &Target, work: &mut Workspace<'_>) -> Vec<Solution> {
+    pub fn solutions_in(&self, target: &Target, work: &mut Scratch<'_>) -> Vec<Solution> {
         work.chain.aim.at(*target);
         let mut distinct: Vec<(Vec<f64>, Solution)> = Vec::new();
         let mut slope = vec![0.0; self.reach.space.region.size()];
@@ -227,7 +222,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// The arcs that the last solve in `work` found, base first.
     #[must_use]
-    pub fn arcs(&self, work: &Workspace<'_>) -> Vec<Arc> {
+    pub fn arcs(&self, work: &Scratch<'_>) -> Vec<Arc> {
         let width = self.plan.width();
         let segments = self.plan.segments().zip(work.search.point.chunks_exact(width));
         let arcs = segments.map(|(segment, q)| Arc {
@@ -238,13 +233,13 @@ impl<'a> ConstantCurvatureInverse<'a> {
     }
 
     /// The displacements that give the robot the arcs that the last solve in `work` found \[m\].
-    pub fn write_displacements(&self, work: &Workspace<'_>, place: &mut [f64]) {
+    pub fn write_displacements(&self, work: &Scratch<'_>, place: &mut [f64]) {
         self.reach.write_displacements(&self.plan, &work.search.point, place);
     }
 
     /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
     #[must_use]
-    pub fn message(&self, answer: &Answer, work: &Workspace<'_>) -> String {
+    pub fn message(&self, answer: &Answer, work: &Scratch<'_>) -> String {
         let held = self.reach.holding(&work.search.point);
         tell(answer, &self.settings, &held, "bending energy")
     }
@@ -267,7 +262,7 @@ const FEW: usize = 8;
 impl Inverter for ConstantCurvatureInverse<'_> {
     type Start = Vec<Arc>;
     type Work<'w>
-        = Workspace<'w>
+        = Scratch<'w>
     where
         Self: 'w;
 
@@ -285,12 +280,12 @@ impl Inverter for ConstantCurvatureInverse<'_> {
         _stop: Option<&sync::Arc<AtomicBool>>,
     ) -> Result<Vec<Arc>, InvalidInput> {
         self.robot.check_displacements(displacements)?;
-        let mut work = constant_curvature::Workspace::default();
+        let mut work = constant_curvature::Scratch::default();
         ConstantCurvature::new(self.robot, &self.plan).solve(displacements, &mut work)?;
         Ok(work.arcs().to_vec())
     }
 
-    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Workspace<'w> {
+    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Scratch<'w> {
         let work = self.workspace();
         match stop {
             Some(stop) => work.stopped_by(stop),
@@ -298,21 +293,21 @@ impl Inverter for ConstantCurvatureInverse<'_> {
         }
     }
 
-    fn solve(&self, target: &Target, start: Option<&Vec<Arc>>, work: &mut Workspace<'_>) -> Answer {
+    fn solve(&self, target: &Target, start: Option<&Vec<Arc>>, work: &mut Scratch<'_>) -> Answer {
         Self::solve(self, target, start.map(Vec::as_slice), work)
     }
 
-    fn follow(&self, target: &Target, work: &mut Workspace<'_>) -> Answer {
+    fn follow(&self, target: &Target, work: &mut Scratch<'_>) -> Answer {
         Self::follow(self, target, work)
     }
 
-    fn write_displacements(&self, work: &Workspace<'_>, place: &mut [f64]) {
+    fn write_displacements(&self, work: &Scratch<'_>, place: &mut [f64]) {
         Self::write_displacements(self, work, place);
     }
 
-    fn write_tensions(&self, _: &Workspace<'_>, _: &mut [f64]) {}
+    fn write_tensions(&self, _: &Scratch<'_>, _: &mut [f64]) {}
 
-    fn message(&self, answer: &Answer, work: &Workspace<'_>) -> String {
+    fn message(&self, answer: &Answer, work: &Scratch<'_>) -> String {
         Self::message(self, answer, work)
     }
 }

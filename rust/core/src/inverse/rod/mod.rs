@@ -1,9 +1,9 @@
 //! The inverse of the strain-energy rod.
 
-mod ending;
+mod disk_positions;
+mod from_rest;
+mod outcome;
 mod path;
-mod rise;
-mod shape;
 mod starts;
 
 use std::f64::consts::TAU;
@@ -12,35 +12,35 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Vector2, Vector3};
 
-use super::aim::Aim;
-use super::answer::{Answer, tell};
+use super::batch::Inverter;
 use super::bounds::{Bounds, Space};
 use super::constant_curvature::{self, ConstantCurvatureInverse};
-use super::pull::Pull;
-use super::rows::Inverter;
-use super::search::{Effort, Freedom, Search};
-use super::tool::ToolGoal;
+use super::multistart::{Effort, Freedom, Search};
+use super::outcome::{Answer, tell};
+use super::pose_goal::ToolGoal;
+use super::pose_residual::Aim;
+use super::tension_problem::Pull;
 use super::{InverseSettings, Method, Target};
 use crate::error::InvalidInput;
 use crate::model::{Model, State};
 use crate::obstacle::Fault;
 use crate::robot::Robot;
-use crate::rod::balance::Balance;
-use crate::rod::contact::{self, Leaning, LoadedRod, Scene};
-use crate::rod::pulled::Pulled;
+use crate::rod::contact::{self, LoadedRod, Scene};
+use crate::rod::equilibrium::FreeRod;
+use crate::rod::equilibrium::{ContactRod, Equilibrium};
 use crate::rod::{self, Plan, Rod, TendonRule};
-use crate::solve::region::Region;
+use crate::solve::convex_region::Region;
 use crate::status::Status;
-use ending::ended;
-use rise::Rise;
-pub use shape::Placed;
+pub use disk_positions::Placed;
+use from_rest::Rise;
+use outcome::ended;
 
 /// Buffers of a solve and the tensions it found.
 #[derive(Debug)]
-pub struct RodWorkspace<'a> {
+pub struct RodScratch<'a> {
     pub(super) pull: Pull<'a>,
     search: Search<'a>,
-    guess: Option<constant_curvature::Workspace<'a>>,
+    guess: Option<constant_curvature::Scratch<'a>>,
     bends: Vec<Vector2<f64>>,
     /// Whether the last solve met its target.
     met: bool,
@@ -64,7 +64,7 @@ pub struct RodInverse<'a> {
     /// What bounds of the region hold back.
     labels: Vec<String>,
     /// The rod at rest.
-    rest: Pulled<'a>,
+    rest: FreeRod<'a>,
     /// The inverse that first guesses are taken from, where the routing allows.
     arcs: Option<ConstantCurvatureInverse<'a>>,
     /// Among obstacles and under loads.
@@ -103,7 +103,7 @@ impl<'a> RodInverse<'a> {
             return Err(InvalidInput::new("settings.tendons", expected, "\"proportional\""));
         }
         bounds.check_rod(robot.tendons().len())?;
-        let rest = Pulled::new(Rod::new(robot, plan));
+        let rest = FreeRod::new(Rod::new(robot, plan));
         let length = robot.backbone().total_length();
         let count = robot.tendons().len();
         let lever = |k: usize| rest.softness(k).sqrt().max(LEVER * length);
@@ -142,8 +142,8 @@ impl<'a> RodInverse<'a> {
     /// Solves unless a function of an obstacle failed before, and keeps its fault if it does now.
     fn watched(
         &self,
-        work: &mut RodWorkspace<'_>,
-        solve: impl FnOnce(&mut RodWorkspace<'_>) -> Answer,
+        work: &mut RodScratch<'_>,
+        solve: impl FnOnce(&mut RodScratch<'_>) -> Answer,
     ) -> Answer {
         let fault = || self.fault.lock().unwrap_or_else(PoisonError::into_inner);
         if self.loaded.is_some() && fault().is_some() {
@@ -155,7 +155,7 @@ impl<'a> RodInverse<'a> {
     }
 
     /// Keeps the first fault of an obstacle's function.
-    fn note_fault(&self, rod: &mut dyn Balance, rise: Option<&mut Rise<'_>>) {
+    fn note_fault(&self, rod: &mut dyn Equilibrium, rise: Option<&mut Rise<'_>>) {
         let own = rise.and_then(Rise::take_fault);
         if let Some(new) = rod.take_fault().or(own) {
             self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(new);
@@ -163,9 +163,9 @@ impl<'a> RodInverse<'a> {
     }
 
     /// The robot under tensions, at rest.
-    fn balance<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Box<dyn Balance + 'w> {
+    fn balance<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Box<dyn Equilibrium + 'w> {
         match &self.loaded {
-            Some(rod) => Box::new(Leaning::new(rod.clone(), stop)),
+            Some(rod) => Box::new(ContactRod::new(rod.clone(), stop)),
             None => Box::new(self.rest.clone()),
         }
     }
@@ -174,7 +174,7 @@ impl<'a> RodInverse<'a> {
         self.loaded.as_ref().map(|rod| Rise::new(rod, self.robot, stop))
     }
 
-    fn write_tensions_of(&self, rod: &dyn Balance, place: &mut [f64]) {
+    fn write_tensions_of(&self, rod: &dyn Equilibrium, place: &mut [f64]) {
         for (own, tension) in place.iter_mut().zip(rod.tensions()) {
             *own = tension * self.rest.unit();
         }
@@ -211,9 +211,9 @@ impl<'a> RodInverse<'a> {
         target: &Target,
         given: bool,
         effort: Effort<'_>,
-        work: &mut RodWorkspace<'_>,
+        work: &mut RodScratch<'_>,
     ) -> Answer {
-        let RodWorkspace { pull, search, guess, bends, met, before: row_before, .. } = work;
+        let RodScratch { pull, search, guess, bends, met, before: row_before, .. } = work;
         *row_before = None;
         pull.aim.aim.at(*target);
         let first: Vec<f64> = if given { self.unknowns(pull.rod.tensions()) } else { Vec::new() };
@@ -260,7 +260,7 @@ impl<'a> RodInverse<'a> {
 impl Inverter for RodInverse<'_> {
     type Start = State;
     type Work<'w>
-        = RodWorkspace<'w>
+        = RodScratch<'w>
     where
         Self: 'w;
 
@@ -279,11 +279,11 @@ impl Inverter for RodInverse<'_> {
     ) -> Result<State, InvalidInput> {
         self.robot.check_displacements(displacements)?;
         if let Some(rod) = &self.loaded {
-            let mut work = contact::Workspace::default();
+            let mut work = contact::Scratch::default();
             rod.lead(displacements, &mut work, stop.map(AsRef::as_ref));
             return Ok(rod.take_state(work));
         }
-        let (mut rod, mut work) = (self.rest.rod().clone(), rod::Workspace::default());
+        let (mut rod, mut work) = (self.rest.rod().clone(), rod::Scratch::default());
         if let Some(stop) = stop {
             rod = rod.stopped_by(Arc::clone(stop));
         }
@@ -291,9 +291,9 @@ impl Inverter for RodInverse<'_> {
         Ok(rod.take_state(work))
     }
 
-    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> RodWorkspace<'w> {
+    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> RodScratch<'w> {
         let lengths = self.rest.rest_lengths();
-        RodWorkspace {
+        RodScratch {
             pull: Pull::new(
                 self.balance(stop),
                 ToolGoal::new(Aim::new(self.robot, &self.settings)),
@@ -311,7 +311,7 @@ impl Inverter for RodInverse<'_> {
     }
 
     /// The start is a shape with its tensions.
-    fn solve(&self, target: &Target, start: Option<&State>, work: &mut RodWorkspace<'_>) -> Answer {
+    fn solve(&self, target: &Target, start: Option<&State>, work: &mut RodScratch<'_>) -> Answer {
         self.watched(work, |work| {
             work.pull.forget();
             let given = if let Some(state) = start {
@@ -326,19 +326,19 @@ impl Inverter for RodInverse<'_> {
 
     /// In steps between which the tool is moved and turned evenly, where one step does not lead there without a
     /// jump; from a few other starts only when that fails, and then `starts` is more than 1.
-    fn follow(&self, target: &Target, work: &mut RodWorkspace<'_>) -> Answer {
+    fn follow(&self, target: &Target, work: &mut RodScratch<'_>) -> Answer {
         self.watched(work, |work| self.go_on(target, work))
     }
 
-    fn write_tensions(&self, work: &RodWorkspace<'_>, place: &mut [f64]) {
+    fn write_tensions(&self, work: &RodScratch<'_>, place: &mut [f64]) {
         self.write_tensions_of(work.pull.rod.as_ref(), place);
     }
 
-    fn state(&self, work: &mut RodWorkspace<'_>) -> Option<State> {
+    fn state(&self, work: &mut RodScratch<'_>) -> Option<State> {
         work.pull.rod.state()
     }
 
-    fn message(&self, answer: &Answer, work: &RodWorkspace<'_>) -> String {
+    fn message(&self, answer: &Answer, work: &RodScratch<'_>) -> String {
         if answer.status == Status::Infeasible {
             return self.shapeless(answer);
         }
@@ -350,7 +350,7 @@ impl Inverter for RodInverse<'_> {
         }
     }
 
-    fn write_displacements(&self, work: &RodWorkspace<'_>, place: &mut [f64]) {
+    fn write_displacements(&self, work: &RodScratch<'_>, place: &mut [f64]) {
         work.pull.write_displacements(place);
     }
 }

@@ -1,10 +1,10 @@
 //! From target to target along a path.
 
-use super::{RodInverse, RodWorkspace, ended};
+use super::{RodInverse, RodScratch, ended};
 use crate::inverse::Target;
-use crate::inverse::answer::Answer;
 use crate::inverse::bounds::Space;
-use crate::inverse::search::{Effort, Found, Freedom};
+use crate::inverse::multistart::{Effort, Found, Freedom};
+use crate::inverse::outcome::Answer;
 use crate::status::Status;
 
 /// Along a path no unknown changes by more in one step \[rad\], and no step is a smaller share of the way between two
@@ -26,7 +26,7 @@ enum Gone {
     Astray,
 }
 
-impl RodWorkspace<'_> {
+impl RodScratch<'_> {
     /// Descends from the point at hand to the target aimed at; whether no unknown is further than a limit from
     /// where it was.
     fn descend(
@@ -50,7 +50,7 @@ impl RodWorkspace<'_> {
 
 impl RodInverse<'_> {
     /// Goes from the point at hand to the target aimed at; nothing where steps do not lead there.
-    pub(super) fn walk(&self, work: &mut RodWorkspace<'_>) -> Option<Answer> {
+    pub(super) fn walk(&self, work: &mut RodScratch<'_>) -> Option<Answer> {
         let effort = Effort { fall_back: false, nearest: false, ..self.effort(1) };
         let (from, to) = (work.pull.rod.motion().tool, work.pull.aim.aim.target());
         let (mut done, mut stride, mut iterations) = (0.0, 1.0_f64, 0);
@@ -98,7 +98,7 @@ impl RodInverse<'_> {
     }
 
     /// From the row before, or from a few starts where that does not lead there.
-    pub(super) fn go_on(&self, target: &Target, work: &mut RodWorkspace<'_>) -> Answer {
+    pub(super) fn go_on(&self, target: &Target, work: &mut RodScratch<'_>) -> Answer {
         if let Some(rise) = &work.rise {
             rise.slacken(&mut work.pull);
         }

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{RodInverse, WIDEST};
 use crate::inverse::Target;
 use crate::inverse::constant_curvature::{self, arc_to};
-use crate::solve::bounded::Bounded;
+use crate::solve::bounded_program::Bounded;
 
 /// Every other random start is no wider than this.
 const USUAL: f64 = 1.5;
@@ -21,7 +21,7 @@ impl RodInverse<'_> {
         &self,
         target: &Target,
         k: usize,
-        guess: Option<&mut constant_curvature::Workspace<'_>>,
+        guess: Option<&mut constant_curvature::Scratch<'_>>,
         bends: &mut Vec<Vector2<f64>>,
         point: &mut Vec<f64>,
     ) {

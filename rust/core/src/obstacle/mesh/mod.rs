@@ -10,8 +10,8 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::{Near, moved, tightest_first};
-use crate::bits::Bits;
 use crate::error::InvalidInput;
+use crate::hashing::Bits;
 use crate::lie::Pose;
 use surface::Surface;
 

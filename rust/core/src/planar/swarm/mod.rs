@@ -4,17 +4,17 @@
 //! the sections, whose lengths then hold by construction, or, as in the paper, the platforms between
 //! them, with the lengths as penalties. `docs/planar.md` has the mathematics.
 
-mod answer;
-mod hunt;
-mod many;
+mod batch;
+mod cost;
+mod objective;
+mod result;
 mod search;
-mod value;
 
-pub use answer::SwarmInverse;
-pub use many::{Row, Rows, solve_rows};
-pub use search::{SwarmSolver, Word};
+pub use batch::{Row, Rows, solve_rows};
+pub use result::SwarmInverse;
+pub use search::{SwarmSolver, WatchDecision};
 
-use super::inverse::InverseSettings;
+use super::newton_inverse::InverseSettings;
 use crate::error::InvalidInput;
 use crate::solve::pso::PsoSettings;
 

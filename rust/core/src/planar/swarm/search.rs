@@ -1,17 +1,17 @@
 //! A search: swarms until Newton's method can take over.
 
 use super::super::clearance::Circle;
-use super::super::inverse::{Goal, InverseSettings, Solver};
+use super::super::newton_inverse::{Goal, InverseSettings, Solver};
 use super::super::trunk::Trunk;
-use super::answer::SwarmInverse;
-use super::hunt::{Hunt, Task};
+use super::objective::{Hunt, Task};
+use super::result::SwarmInverse;
 use super::{SwarmSettings, Unknowns};
 use crate::error::InvalidInput;
 use crate::solve::pso::{Progress, PsoSettings, Swarm};
 
 /// What whoever watches a search wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Word {
+pub enum WatchDecision {
     /// To go on.
     GoOn,
     /// The best that there is by now.
@@ -24,14 +24,14 @@ pub enum Word {
 ///
 /// ```
 /// use nalgebra::Vector2;
-/// use tdcr::planar::{Circle, Goal, SwarmSettings, SwarmSolver, Trunk, Word};
+/// use tdcr::planar::{Circle, Goal, SwarmSettings, SwarmSolver, Trunk, WatchDecision};
 ///
 /// # fn main() -> Result<(), tdcr::InvalidInput> {
 /// let trunk = Trunk::new(vec![0.14, 0.12], 0.03)?;
 /// let circles = [Circle::new(0.12, 0.08, 0.02)?];
 /// let mut solver = SwarmSolver::new(&trunk, &circles, &SwarmSettings::default())?;
 /// let goal = Goal { point: Vector2::new(0.2, 0.06), heading: None, limits: vec![3.0] };
-/// let found = solver.solve(&goal, 0, &mut |_| Word::GoOn)?;
+/// let found = solver.solve(&goal, 0, &mut |_| WatchDecision::GoOn)?;
 /// assert!(found.is_some_and(|found| found.inverse.error < 1e-12 && found.clearance >= 0.0));
 /// # Ok(())
 /// # }
@@ -89,7 +89,7 @@ impl<'a> SwarmSolver<'a> {
         &mut self,
         goal: &Goal,
         seed: u64,
-        watch: &mut dyn FnMut(&Progress) -> Word,
+        watch: &mut dyn FnMut(&Progress) -> WatchDecision,
     ) -> Result<Option<SwarmInverse>, InvalidInput> {
         let solver = Solver::new(self.trunk, goal, &self.newton)?;
         let SwarmSettings { swarm, unknowns, polish, tolerance, restarts, .. } = self.settings;

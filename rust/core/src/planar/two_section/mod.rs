@@ -1,6 +1,7 @@
 //! Every pair of turns that puts the tip of two sections on a point.
 
 mod equation;
+mod nearest;
 mod polish;
 mod search;
 mod table;

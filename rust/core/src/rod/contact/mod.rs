@@ -2,17 +2,15 @@
 //!
 //! The mathematics is in `docs/contact.md`.
 
-mod climb;
-mod descent;
-mod field;
-mod leaning;
+mod augmented_lagrangian;
+pub(in crate::rod) mod continuation;
+mod lagrangian;
 mod loads;
-mod merit;
-mod model;
+pub(in crate::rod) mod model;
+mod potential;
+mod riccati;
 mod scene;
-mod sweep;
 
-pub(crate) use leaning::Leaning;
 pub use loads::Loads;
-pub use model::{LoadedRod, Workspace};
+pub use model::{LoadedRod, Scratch};
 pub use scene::Scene;

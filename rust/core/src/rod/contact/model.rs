@@ -3,46 +3,46 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::climb::{Given, Kept, REACH};
-use super::descent::{Descent, Left};
-use super::merit::Held;
+use super::augmented_lagrangian::{Descent, Left};
+use super::continuation::{Checkpoint, REACH, TendonTarget};
+use super::lagrangian::MultiplierEstimate;
 use super::scene::{Point, Scene};
 use crate::error::InvalidInput;
 use crate::lie::Pose;
+use crate::model::Contact;
 use crate::model::{Model, Report, State};
 use crate::obstacle::{Fault, Near};
 use crate::robot::Robot;
-use crate::rod::ascent::Ending;
-use crate::rod::chain::Chain;
+use crate::rod::dual_newton::Ending;
 use crate::rod::model::{Rod, read_state, told, write_state};
+use crate::rod::newton_system::Chain;
 use crate::rod::plan::Plan;
 use crate::rod::settings::TendonRule;
-use crate::shape::Contact;
 use crate::status::Status;
 
 /// Contacts are listed up to this gap, in shares of the robot's length.
 const TOUCH: f64 = 1e-9;
 /// Buffers of a solve.
 #[derive(Debug, Default)]
-pub struct Workspace {
-    pub(super) state: State,
-    pub(super) descent: Descent,
+pub struct Scratch {
+    pub(in crate::rod) state: State,
+    pub(in crate::rod) descent: Descent,
     /// For the compliance of the tendons at rest.
-    pub(super) chain: Chain,
+    pub(in crate::rod) chain: Chain,
     /// The last solve, or the last load that was reached.
-    pub(super) kept: Kept,
-    pub(super) left: Left,
-    pub(super) ending: Ending,
+    pub(in crate::rod) kept: Checkpoint,
+    pub(in crate::rod) left: Left,
+    pub(in crate::rod) ending: Ending,
     /// Share of the load that was reached.
-    pub(super) load: f64,
+    pub(in crate::rod) load: f64,
     /// Saddles left on the way.
-    pub(super) nudged: usize,
+    pub(in crate::rod) nudged: usize,
     /// How deep the undeformed robot is in an obstacle, which, and at which disk.
-    pub(super) sunk: Option<(f64, usize, usize)>,
-    pub(super) fault: Option<Fault>,
+    pub(in crate::rod) sunk: Option<(f64, usize, usize)>,
+    pub(in crate::rod) fault: Option<Fault>,
 }
 
-impl Workspace {
+impl Scratch {
     /// What a function of an obstacle ended the last solve with, if it did.
     pub fn take_fault(&mut self) -> Option<Fault> {
         self.fault.take()
@@ -55,7 +55,7 @@ pub struct LoadedRod<'r> {
     rod: Rod<'r>,
     scene: &'r Scene,
     /// Length of the shortest subsegment \[m\].
-    pub(super) shortest: f64,
+    pub(in crate::rod) shortest: f64,
 }
 
 impl<'r> LoadedRod<'r> {
@@ -79,7 +79,7 @@ impl<'r> LoadedRod<'r> {
         Self { rod: self.rod.stopped_by(stop), ..self }
     }
 
-    pub(super) fn plan(&self) -> &'r Plan {
+    pub(in crate::rod) fn plan(&self) -> &'r Plan {
         self.rod.plan
     }
 
@@ -92,7 +92,7 @@ impl<'r> LoadedRod<'r> {
         &self,
         start: &State,
         displacements: &[f64],
-        work: &mut Workspace,
+        work: &mut Scratch,
     ) -> Result<Report, InvalidInput> {
         let plan = self.plan();
         self.begin(work);
@@ -100,7 +100,7 @@ impl<'r> LoadedRod<'r> {
         read_state(start, plan, &mut here.strains, &mut estimates.tensions)?;
         let own = estimates.tensions.iter().zip(&plan.compliance);
         let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, give))| l - t * give);
-        work.kept.given = Some(Given::Lengths(from.collect()));
+        work.kept.given = Some(TendonTarget::Lengths(from.collect()));
         // A fault comes again, and is told, where the shape is evaluated.
         if self.sink(work).is_err() {
             work.sunk = None;
@@ -124,15 +124,15 @@ impl<'r> LoadedRod<'r> {
     pub fn solve_tensions(
         &self,
         tensions: &[f64],
-        work: &mut Workspace,
+        work: &mut Scratch,
     ) -> Result<Report, InvalidInput> {
         self.plan().check_tensions(tensions)?;
         let tensions = tensions.iter().map(|tension| tension / self.plan().unit).collect();
-        Ok(self.rise(&Given::Tensions(tensions), work, self.rod.stop.as_deref()))
+        Ok(self.rise(&TendonTarget::Tensions(tensions), work, self.rod.stop.as_deref()))
     }
 
     /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
-    pub(super) fn recall(&self, start: &State, work: &mut Workspace) {
+    pub(in crate::rod) fn recall(&self, start: &State, work: &mut Scratch) {
         let (plan, base) = (self.plan(), self.rod.robot.base());
         let reach = REACH * self.shortest;
         let mut near = Vec::new();
@@ -157,13 +157,13 @@ impl<'r> LoadedRod<'r> {
             };
             let key = (contact.disk, p, contact.obstacle, part.feature);
             let force = contact.force.norm() / plan.unit;
-            work.descent.estimates.forces.push(Held::new(key, force, &at, part));
+            work.descent.estimates.forces.push(MultiplierEstimate::new(key, force, &at, part));
         }
         work.descent.estimates.forces.sort_by_key(|held| held.key);
     }
 
     /// How deep the undeformed robot is in the obstacles.
-    pub(super) fn sink(&self, work: &mut Workspace) -> Result<(), Fault> {
+    pub(in crate::rod) fn sink(&self, work: &mut Scratch) -> Result<(), Fault> {
         work.sunk = None;
         let mut frame = Pose::identity();
         let plan = self.plan();
@@ -185,16 +185,16 @@ impl<'r> LoadedRod<'r> {
         Ok(())
     }
 
-    fn finish(&self, work: &mut Workspace, evaluations: usize) -> Report {
+    fn finish(&self, work: &mut Scratch, evaluations: usize) -> Report {
         self.written(work);
         told(work.ending, work.left.worst(), evaluations)
     }
 
     /// The shape at hand, written out.
-    pub(super) fn written<'w>(&self, work: &'w mut Workspace) -> &'w State {
+    pub(in crate::rod) fn written<'w>(&self, work: &'w mut Scratch) -> &'w State {
         let plan = self.plan();
         let base = self.rod.robot.base();
-        let Workspace { state, descent, .. } = work;
+        let Scratch { state, descent, .. } = work;
         let here = &descent.here;
         write_state(state, &self.rod, &here.strains, &here.ends, &here.tensions);
         let touch = TOUCH * plan.total_length();
@@ -216,20 +216,20 @@ impl<'r> LoadedRod<'r> {
         &work.state
     }
 
-    pub(super) fn scene(&self) -> &'r Scene {
+    pub(in crate::rod) fn scene(&self) -> &'r Scene {
         self.scene
     }
 
     /// Greatest lengths of the tendons under displacements.
-    fn lengths(&self, displacements: &[f64]) -> Given {
+    fn lengths(&self, displacements: &[f64]) -> TendonTarget {
         let rest = &self.plan().rest_lengths;
-        Given::Lengths(rest.iter().zip(displacements).map(|(l, d)| l + d).collect())
+        TendonTarget::Lengths(rest.iter().zip(displacements).map(|(l, d)| l + d).collect())
     }
 
     /// What stands in the way of a shape without tensions; empty when nothing does.
     pub(crate) fn hindrance(&self) -> String {
-        let mut work = Workspace::default();
-        let none = Given::Tensions(vec![0.0; self.plan().rest_lengths.len()]);
+        let mut work = Scratch::default();
+        let none = TendonTarget::Tensions(vec![0.0; self.plan().rest_lengths.len()]);
         self.rise(&none, &mut work, self.rod.stop.as_deref());
         self.message(&[], &work)
     }
@@ -238,13 +238,13 @@ impl<'r> LoadedRod<'r> {
     pub(crate) fn lead(
         &self,
         displacements: &[f64],
-        work: &mut Workspace,
+        work: &mut Scratch,
         stop: Option<&AtomicBool>,
     ) -> Report {
         self.rise(&self.lengths(displacements), work, stop)
     }
 
-    fn rise(&self, wanted: &Given, work: &mut Workspace, stop: Option<&AtomicBool>) -> Report {
+    fn rise(&self, wanted: &TendonTarget, work: &mut Scratch, stop: Option<&AtomicBool>) -> Report {
         self.run(work, |work, budget| {
             self.begin(work);
             self.sink(work)?;
@@ -254,8 +254,8 @@ impl<'r> LoadedRod<'r> {
 
     fn run(
         &self,
-        work: &mut Workspace,
-        solve: impl FnOnce(&mut Workspace, &mut usize) -> Result<(), Fault>,
+        work: &mut Scratch,
+        solve: impl FnOnce(&mut Scratch, &mut usize) -> Result<(), Fault>,
     ) -> Report {
         let most = self.plan().settings.max_iterations;
         let mut budget = most;
@@ -270,7 +270,7 @@ impl<'r> LoadedRod<'r> {
 }
 
 impl Model for LoadedRod<'_> {
-    type Workspace = Workspace;
+    type Scratch = Scratch;
 
     fn robot(&self) -> &Robot {
         self.rod.robot
@@ -284,12 +284,12 @@ impl Model for LoadedRod<'_> {
         self.plan().settings.elements
     }
 
-    fn solve(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
+    fn solve(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
         Ok(self.lead(displacements, work, self.rod.stop.as_deref()))
     }
 
-    fn resume(&self, displacements: &[f64], work: &mut Workspace) -> Result<Report, InvalidInput> {
-        let Some(from @ Given::Lengths(_)) = work.kept.given.clone() else {
+    fn resume(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
+        let Some(from @ TendonTarget::Lengths(_)) = work.kept.given.clone() else {
             return self.solve(displacements, work);
         };
         if work.ending != Ending::Converged {
@@ -306,15 +306,15 @@ impl Model for LoadedRod<'_> {
         self.solve(displacements, work)
     }
 
-    fn state<'w>(&self, work: &'w Workspace) -> &'w State {
+    fn state<'w>(&self, work: &'w Scratch) -> &'w State {
         &work.state
     }
 
-    fn take_state(&self, work: Workspace) -> State {
+    fn take_state(&self, work: Scratch) -> State {
         work.state
     }
 
-    fn message(&self, _: &[f64], work: &Workspace) -> String {
+    fn message(&self, _: &[f64], work: &Scratch) -> String {
         if let Some(fault) = &work.fault {
             return format!("an obstacle's function failed: {fault}");
         }

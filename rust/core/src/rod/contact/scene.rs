@@ -2,14 +2,14 @@
 
 use nalgebra::Vector3;
 
+use super::lagrangian::Clearance;
 use super::loads::Loads;
-use super::merit::Spot;
 use crate::error::InvalidInput;
 use crate::lie::Pose;
+use crate::model::PointKind;
 use crate::obstacle::{Fault, Obstacle, Volume};
 use crate::robot::Robot;
 use crate::rod::plan::Plan;
-use crate::shape::PointKind;
 
 /// A point of a disk that may touch.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,7 @@ pub struct Scene {
     pub(super) points: Vec<Vec<Point>>,
     /// Force on every disk's centre and moment on the tip, base frame's axes, in the plan's unit.
     pub(super) forces: Vec<Vector3<f64>>,
-    pub(super) moment: Vector3<f64>,
+    pub(in crate::rod) moment: Vector3<f64>,
     /// Whether the moment or any force is not zero.
     pub(super) loaded: bool,
 }
@@ -89,8 +89,8 @@ impl Scene {
     pub(super) fn leads(
         &self,
         radius: f64,
-        from: &Spot,
-        to: &Spot,
+        from: &Clearance,
+        to: &Clearance,
         slip: f64,
         sides: bool,
         cuts: usize,
@@ -104,7 +104,7 @@ impl Scene {
         if cuts == 0 {
             return Ok(false);
         }
-        let mut middle = Spot::new((from.at + to.at) * 0.5);
+        let mut middle = Clearance::new((from.at + to.at) * 0.5);
         for obstacle in &self.obstacles {
             middle.count(&obstacle.nearest(&middle.at)?, radius);
         }

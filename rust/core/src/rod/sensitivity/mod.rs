@@ -11,14 +11,14 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix6xX, Vector3};
 
-use super::model::{Rod, Workspace};
+use super::model::{Rod, Scratch};
 use super::plan::Plan;
 use super::settings::TendonRule;
 use super::subsegment::{Local, Piece};
-use super::sweep::{Solved, Sweep};
+use super::tip_rates::{Solved, Sweep};
 use crate::lie::Pose;
-use crate::solve::least_squares::PseudoInverse;
-use crate::solve::quadratic::{backward, dot, forward};
+use crate::solve::pseudo_inverse::PseudoInverse;
+use crate::solve::quadratic_program::{backward, dot, forward};
 
 /// A change of what a rod is made of, or a gradient by it.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,7 +86,7 @@ impl<'r> Rod<'r> {
     /// followed on its pulled side. Where taut tendons depend on each other, displacements cannot change one
     /// by one: the derivatives are then those of the nearest change that the rod can follow.
     #[must_use]
-    pub fn sensitivity(&self, displacements: &[f64], work: &Workspace) -> Sensitivity<'r> {
+    pub fn sensitivity(&self, displacements: &[f64], work: &Scratch) -> Sensitivity<'r> {
         let mut at = Linearized {
             displacements: displacements.to_vec(),
             strains: work.chain.strains.clone(),
@@ -115,7 +115,7 @@ impl<'r> Rod<'r> {
 }
 
 impl Linearized {
-    fn assemble_whole(&mut self, plan: &Plan, work: &Workspace) {
+    fn assemble_whole(&mut self, plan: &Plan, work: &Scratch) {
         let chain = &work.chain;
         self.factors.clone_from(&chain.factors);
         self.images.clone_from(&chain.images);
@@ -158,7 +158,7 @@ impl Linearized {
         self.count += schur.nrows();
     }
 
-    fn assemble_pieces(&mut self, plan: &Plan, work: &Workspace) {
+    fn assemble_pieces(&mut self, plan: &Plan, work: &Scratch) {
         let mut chain = work.part.clone();
         // One that is held at the length that it has at rest drives as soon as it is pulled.
         let lengths = work.state.tendon_lengths.iter().zip(&plan.rest_lengths);

@@ -6,13 +6,13 @@
 //! and may use as many threads as it likes. Every particle draws from a stream of its own, so a run
 //! depends on nothing but seed, settings and objective. `docs/pso.md` has the mathematics.
 
-mod cloud;
-mod draws;
-mod leaders;
 mod objective;
+mod particles;
+mod random;
 mod report;
 mod settings;
 mod swarm;
+mod topology;
 
 pub use objective::{Objective, Parallel, Pointwise, Progress, Watched, Whole};
 pub use report::{Report, Stop};

@@ -1,11 +1,11 @@
 //! A run: evaluate, remember, follow, move.
 
-use super::cloud::Cloud;
-use super::draws::Draws;
-use super::leaders::Leaders;
 use super::objective::{Objective, Progress};
+use super::particles::Cloud;
+use super::random::Draws;
 use super::report::{Report, Stop};
 use super::settings::PsoSettings;
+use super::topology::Leaders;
 use crate::error::InvalidInput;
 
 /// A swarm in a box, with all its memory: runs allocate nothing, and any number of them reuse it.
@@ -304,7 +304,7 @@ fn check_box(lower: &[f64], upper: &[f64]) -> Result<(), InvalidInput> {
 fn fits(settings: &PsoSettings, dimensions: usize) -> Result<(), InvalidInput> {
     // Nine numbers per coordinate and at least one draw, which come in blocks of 32.
     let size = settings.particles.saturating_mul(dimensions.max(32)).saturating_mul(10);
-    let size = size.saturating_add(super::leaders::links(settings));
+    let size = size.saturating_add(super::topology::links(settings));
     // What any machine has is not asked for: a reset of a small swarm allocates nothing.
     if size <= 1 << 20 {
         return Ok(());

@@ -1,0 +1,232 @@
+//! Descents from many starts until one meets the target.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::solve::levenberg_marquardt::{Ending, Problem, Purpose, Scratch};
+use crate::solve::pso::{PsoSettings, Swarm};
+use crate::status::Status;
+
+use super::Method;
+use super::bounds::Space;
+
+/// Ends of descents that are kept as candidates for the nearest point.
+const CANDIDATES: usize = 4;
+/// Steps that find the nearest point from a candidate.
+const POLISH: usize = 300;
+/// Steps that lower the energy.
+const LOWER: usize = 500;
+/// The same where derivatives jump.
+const LOWER_KINKS: usize = 30;
+
+/// Buffers of a search, and the point it found.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Search<'a, const R: usize = 6> {
+    pub(super) fit: Scratch<R>,
+    /// The unknowns found.
+    pub(super) point: Vec<f64>,
+    /// Ends the search before its next start when it is set.
+    pub(super) stop: Option<&'a AtomicBool>,
+    pub(super) swarm: Option<Swarm>,
+    /// Where descents ended that did not meet the target, by their squared residual, best first.
+    pub(super) candidates: Vec<(f64, Vec<f64>)>,
+}
+
+/// How a search ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Found {
+    pub(super) status: Status,
+    pub(super) iterations: usize,
+    pub(super) starts: usize,
+}
+
+/// Freedom that is spent on the energy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Freedom {
+    /// None is left, or it is not to be spent.
+    None,
+    Smooth,
+    /// Derivatives jump: the energy is least where no step leads lower.
+    Kinked,
+}
+
+/// What to search for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort<'s> {
+    /// The first start, and how many.
+    pub(super) first: usize,
+    pub(super) starts: usize,
+    pub(super) max_iterations: usize,
+    /// What the target leaves, to spend on the energy.
+    pub(super) freedom: Freedom,
+    pub(super) method: Method,
+    /// No start beyond these is from a swarm.
+    pub(super) swarms: usize,
+    /// A swarm is the last resort.
+    pub(super) fall_back: bool,
+    /// The nearest point is wanted where none meets the target.
+    pub(super) nearest: bool,
+    pub(super) swarm: &'s PsoSettings,
+}
+
+impl<const R: usize> Search<'_, R> {
+    /// Tries `start(k, point)` for one k after the other until a descent meets the target; else finds the point
+    /// nearest to it. `point` holds the answer whatever the status, and was evaluated last.
+    pub(super) fn run<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        space: &Space,
+        effort: Effort<'_>,
+        start: impl FnMut(usize, &mut Vec<f64>),
+    ) -> Found {
+        let (status, starts) = self.seek(problem, space, effort, start);
+        if status != Status::Converged {
+            self.fit.evaluate(problem, &self.point);
+        }
+        Found { status, iterations: self.fit.iterations, starts }
+    }
+
+    /// How the search ended, and after how many starts.
+    fn seek<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        space: &Space,
+        effort: Effort<'_>,
+        mut start: impl FnMut(usize, &mut Vec<f64>),
+    ) -> (Status, usize) {
+        self.fit.iterations = 0;
+        self.candidates.clear();
+        let mut descended = false;
+        for tried in 0..effort.starts {
+            if tried > 0 && self.stopped() {
+                return (Status::IterationLimit, tried);
+            }
+            let k = effort.first + tried;
+            if tried > 0 {
+                problem.restart();
+            }
+            let inside = if effort.method == Method::Newton || k >= effort.swarms {
+                start(k, &mut self.point);
+                self.fit.restore(&space.region, &mut self.point)
+            } else {
+                self.settle(problem, space, effort.swarm, k)
+            };
+            if !inside {
+                // A start may be too far away to be brought back; the middle of the box is not.
+                if tried == 0 && !self.has_a_point(space) {
+                    return (Status::Infeasible, 1);
+                }
+                continue;
+            }
+            descended = true;
+            if let Some(status) = self.descend(problem, space, effort) {
+                return (status, tried + 1);
+            }
+        }
+        // A swarm looks where the starts did not, unless none of them had a value at all.
+        if effort.fall_back && !(descended && self.candidates.is_empty()) {
+            problem.restart();
+            if self.settle(problem, space, effort.swarm, 0)
+                && let Some(status) = self.descend(problem, space, effort)
+            {
+                return (status, effort.starts);
+            }
+        }
+        if !effort.nearest {
+            return (Status::Unreachable, effort.starts);
+        }
+        (self.nearest(problem, space, effort), effort.starts)
+    }
+
+    /// Whether the region has a point, which is then at hand.
+    fn has_a_point(&mut self, space: &Space) -> bool {
+        self.point.clear();
+        self.point.extend(space.lower.iter().zip(&space.upper).map(|(l, u)| 0.5 * (l + u)));
+        self.fit.restore(&space.region, &mut self.point)
+    }
+
+    /// Descends from the point at hand: the status if it meets the target.
+    fn descend<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        space: &Space,
+        effort: Effort<'_>,
+    ) -> Option<Status> {
+        let limit = effort.max_iterations;
+        match self.fit.descend(problem, &space.region, &mut self.point, Purpose::Meet, limit) {
+            Ending::Met => return Some(self.spend_freedom(problem, space, effort)),
+            Ending::Failed => {}
+            Ending::Stalled | Ending::IterationLimit => self.remember(),
+        }
+        None
+    }
+
+    /// Whether it was told to end.
+    pub(super) fn stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
+
+    /// Lowers the energy where the target leaves freedom.
+    fn spend_freedom<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        space: &Space,
+        effort: Effort<'_>,
+    ) -> Status {
+        let (kinks, most) = match effort.freedom {
+            Freedom::None => return Status::Converged,
+            Freedom::Smooth => (false, LOWER),
+            Freedom::Kinked => (true, LOWER_KINKS),
+        };
+        match self.fit.lower_energy(problem, &space.region, &mut self.point, most) {
+            Ending::Met => Status::Converged,
+            _ if kinks && problem.met(&self.fit.residual) => Status::Converged,
+            _ => Status::IterationLimit,
+        }
+    }
+
+    /// Keeps the point if it is among the best.
+    fn remember(&mut self) {
+        let squared = self.fit.residual.norm_squared();
+        let place = self.candidates.partition_point(|(other, _)| *other <= squared);
+        if squared.is_finite() && place < CANDIDATES {
+            self.candidates.truncate(CANDIDATES - 1);
+            self.candidates.insert(place.min(self.candidates.len()), (squared, self.point.clone()));
+        }
+    }
+
+    /// Descends to a minimum from the best candidates and keeps the best.
+    fn nearest<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        space: &Space,
+        effort: Effort<'_>,
+    ) -> Status {
+        let mut best: Option<(f64, Status, Vec<f64>)> = None;
+        for (_, mut point) in std::mem::take(&mut self.candidates) {
+            problem.restart();
+            let ending =
+                self.fit.descend(problem, &space.region, &mut point, Purpose::Nearest, POLISH);
+            let squared = self.fit.residual.norm_squared();
+            if ending == Ending::Met {
+                self.point = point;
+                return self.spend_freedom(problem, space, effort);
+            }
+            let status = match ending {
+                Ending::Stalled => Status::Unreachable,
+                _ => Status::IterationLimit,
+            };
+            let nearer = best.as_ref().is_none_or(|(least, _, _)| squared < *least);
+            if squared.is_finite() && nearer {
+                // After a step that was refused.
+                self.fit.evaluate(problem, &point);
+                problem.keep();
+                best = Some((squared, status, point));
+            }
+        }
+        let Some((_, status, point)) = best else { return Status::NumericalError };
+        // Only to what this search kept: another one's balance would depend on the rows before.
+        problem.go_back();
+        self.point = point;
+        status
+    }
+}

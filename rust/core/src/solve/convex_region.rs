@@ -1,0 +1,212 @@
+//! Convex regions of unknowns: linear equations and bounds, and discs whose radius may grow with one of
+//! the unknowns.
+
+use super::quadratic_program::{Outcome, Quadratic, Rows, dot};
+
+/// `|(z_first, z_first+1)| <= radius`, or `<= radius * z_scale`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disc {
+    /// Index of the first of the two unknowns.
+    pub first: usize,
+    /// The radius, or what it is per unit of the unknown that scales it.
+    pub radius: f64,
+    /// The unknown that scales it.
+    pub scale: Option<usize>,
+}
+
+impl Disc {
+    /// How far outside a point is; negative inside.
+    fn excess(&self, z: &[f64]) -> f64 {
+        let reach = self.scale.map_or(self.radius, |k| self.radius * z[k]);
+        length(z, self.first) - reach
+    }
+
+    /// Length of the gradient of the excess: normals of rows are of length 1.
+    fn slope(&self) -> f64 {
+        if self.scale.is_some() { 1.0_f64.hypot(self.radius) } else { 1.0 }
+    }
+}
+
+/// Length of two unknowns; squares of what counts here neither overflow nor vanish.
+fn length(z: &[f64], first: usize) -> f64 {
+    (z[first] * z[first] + z[first + 1] * z[first + 1]).sqrt()
+}
+
+/// A convex region.
+#[derive(Clone, Debug, Default)]
+pub struct Region {
+    size: usize,
+    /// Linear rows on the unknowns themselves, equations first.
+    linear: Rows,
+    discs: Vec<Disc>,
+}
+
+/// Points are brought back to within this of the region.
+const INSIDE: f64 = 1e-13;
+
+impl Region {
+    /// The whole space.
+    #[must_use]
+    pub fn new(size: usize) -> Self {
+        Self { size, ..Self::default() }
+    }
+
+    /// Number of unknowns.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Number of equations.
+    #[must_use]
+    pub fn equations(&self) -> usize {
+        self.linear.equalities
+    }
+
+    /// Adds `normal . z = value`; equations come before everything else. A normal of zeros is left out.
+    pub fn equate(&mut self, normal: &[f64], value: f64) {
+        if self.push(normal, value) {
+            self.linear.equalities += 1;
+        }
+    }
+
+    /// Adds `normal . z <= bound`, unless the bound is infinite or the normal zero; returns whether.
+    pub fn bound(&mut self, normal: &[f64], bound: f64) -> bool {
+        bound < f64::INFINITY && self.push(normal, bound)
+    }
+
+    fn push(&mut self, normal: &[f64], value: f64) -> bool {
+        let norm = dot(normal, normal).sqrt();
+        if norm > 0.0 {
+            let row = self.linear.push(self.size, value / norm);
+            row.iter_mut().zip(normal).for_each(|(to, from)| *to = from / norm);
+        }
+        norm > 0.0
+    }
+
+    /// Adds a disc.
+    pub fn add_disc(&mut self, disc: Disc) {
+        self.discs.push(disc);
+    }
+
+    /// Bounds, in the order they were added, and discs, in theirs, on whose edge a point lies to `within`.
+    #[must_use]
+    pub fn at_edge(&self, z: &[f64], within: f64) -> (Vec<usize>, Vec<usize>) {
+        let first = self.linear.equalities;
+        let bounds = (first..self.linear.offsets.len())
+            .filter(|k| {
+                dot(self.linear.normal(self.size, *k), z) >= self.linear.offsets[*k] - within
+            })
+            .map(|k| k - first);
+        let discs = self.discs.iter().enumerate();
+        let discs = discs.filter(|(_, disc)| disc.excess(z) >= -within).map(|(k, _)| k);
+        (bounds.collect(), discs.collect())
+    }
+
+    /// Largest violation at a point; 0 inside.
+    #[must_use]
+    pub fn violation(&self, z: &[f64]) -> f64 {
+        let linear = (self.linear.offsets.iter().enumerate()).map(|(k, offset)| {
+            let off = dot(self.linear.normal(self.size, k), z) - offset;
+            if k < self.linear.equalities { off.abs() } else { off }
+        });
+        let discs = self.discs.iter().map(|disc| disc.excess(z) / disc.slope());
+        linear.chain(discs).fold(0.0, f64::max)
+    }
+
+    /// Adds the constraints on a step from `z` to rows that are all equations; the discs by their
+    /// tangents, which contain them.
+    pub fn linearize(&self, z: &[f64], rows: &mut Rows) {
+        rows.normals.extend_from_slice(&self.linear.normals);
+        rows.equalities += self.linear.equalities;
+        for (k, offset) in self.linear.offsets.iter().enumerate() {
+            rows.offsets.push(offset - dot(self.linear.normal(self.size, k), z));
+        }
+        for disc in &self.discs {
+            let norm = length(z, disc.first);
+            // At the centre every direction is a tangent's; a step from there is brought back later.
+            let (x, y) = if norm > 0.0 {
+                (z[disc.first] / norm, z[disc.first + 1] / norm)
+            } else {
+                (0.0, 0.0)
+            };
+            let slope = disc.slope();
+            let row = rows.push(self.size, -disc.excess(z) / slope);
+            row[disc.first] = x / slope;
+            row[disc.first + 1] = y / slope;
+            if let Some(scale) = disc.scale {
+                row[scale] = -disc.radius / slope;
+            }
+        }
+    }
+
+    /// Adds the curvature of the discs that are active in `solved` to the lower triangle of a Hessian at
+    /// `z`: the second derivatives of `sum multiplier * excess / slope`. Its program had `before` rows
+    /// before those of this region.
+    pub fn add_curvature(&self, z: &[f64], solved: &Quadratic, before: usize, hessian: &mut [f64]) {
+        let linear = before + self.linear.offsets.len();
+        for (&row, multiplier) in solved.active.iter().zip(&solved.multipliers) {
+            let Some(disc) = row.checked_sub(linear).and_then(|k| self.discs.get(k)) else {
+                continue;
+            };
+            let (i, j) = (disc.first, disc.first + 1);
+            let norm = length(z, i);
+            if norm > 0.0 {
+                let (x, y) = (z[i] / norm, z[j] / norm);
+                let weight = multiplier / (norm * disc.slope());
+                hessian[i * self.size + i] += weight * y * y;
+                hessian[j * self.size + i] -= weight * x * y;
+                hessian[j * self.size + j] += weight * x * x;
+            }
+        }
+    }
+
+    /// Whether a point is inside, to rounding.
+    #[must_use]
+    pub fn contains(&self, z: &[f64]) -> bool {
+        self.violation(z) <= INSIDE
+    }
+
+    /// Brings a point back into the region by steps of least length; false when the region is empty as
+    /// far as this can tell. A point inside stays as it is, bit by bit.
+    pub fn restore(&self, z: &mut [f64], work: &mut Restoring) -> bool {
+        // Tangents to discs converge like Newton's method.
+        for _ in 0..30 {
+            if self.contains(z) {
+                return true;
+            }
+            if !self.return_by(z, work, |_| {}) {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// One such step, under further rows; false when no step meets them all.
+    pub fn return_by(
+        &self,
+        z: &mut [f64],
+        work: &mut Restoring,
+        further: impl FnOnce(&mut Rows),
+    ) -> bool {
+        let Restoring { program, rows } = work;
+        rows.clear();
+        self.linearize(z, rows);
+        further(rows);
+        program.factor_identity(self.size);
+        program.gradient.clear();
+        program.gradient.resize(self.size, 0.0);
+        if program.solve(rows) != Outcome::Solved {
+            return false;
+        }
+        z.iter_mut().zip(&program.step).for_each(|(z, p)| *z += p);
+        true
+    }
+}
+
+/// Buffers of [`Region::restore`].
+#[derive(Clone, Debug, Default)]
+pub struct Restoring {
+    program: Quadratic,
+    rows: Rows,
+}

@@ -1,0 +1,198 @@
+//! The least energy among the points that meet a target, inside a convex region.
+//!
+//! `min E(z)` subject to `r(z) = 0`, `z` in a [`Region`], from a point that meets it: every step is the
+//! minimum of the quadratic model of the Lagrangian under the linearised target and region (sequential
+//! quadratic programming, Nocedal & Wright, *Numerical Optimization*, 2nd ed., section 18.1), and is then
+//! brought back onto the target, so that every point meets it and the energy alone measures progress.
+
+use super::{Ending, Problem, Purpose, Scratch};
+use crate::solve::convex_region::Region;
+use crate::solve::quadratic_program::{Outcome, Quadratic, Rows, dot};
+use nalgebra::SVector;
+
+/// No step moves an unknown further.
+const STEP: f64 = 0.5;
+/// Steps to bring a point back onto the target.
+const CORRECTIONS: usize = 8;
+/// Shrinks of one line search, and by how much each.
+const BACKTRACKS: usize = 6;
+const BACKTRACK: f64 = 0.3;
+/// Share of the predicted decrease that a step must deliver.
+const ARMIJO: f64 = 1e-4;
+/// Damping of an indefinite model at first, and damping beyond which no step is left.
+const DAMPING: (f64, f64) = (1e-3, 1e10);
+/// Damping at least: the energy may not depend on some unknowns at all.
+const FLOOR: f64 = 1e-6;
+/// A minimum is found when the gradient of the Lagrangian is below this.
+const STATIONARY: f64 = 1e-9;
+/// Energies of order 1 are known to this.
+const ROUNDING: f64 = 1e-14;
+
+/// Buffers of a descent of the energy.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Least {
+    energy: f64,
+    gradient: Vec<f64>,
+    next: Vec<f64>,
+    next_gradient: Vec<f64>,
+    program: Quadratic,
+    rows: Rows,
+}
+
+impl<const R: usize> Scratch<R> {
+    /// Lowers the energy from `z`, which meets the target: [`Ending::Met`] at a minimum. `z` meets the
+    /// target at any ending.
+    pub fn lower_energy<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        z: &mut Vec<f64>,
+        max_iterations: usize,
+    ) -> Ending {
+        let mut least = std::mem::take(&mut self.least);
+        let ending = self.lower(problem, region, z, max_iterations, &mut least);
+        self.least = least;
+        ending
+    }
+
+    fn lower<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        z: &mut Vec<f64>,
+        max_iterations: usize,
+        least: &mut Least,
+    ) -> Ending {
+        least.gradient.resize(region.size(), 0.0);
+        least.next_gradient.resize(region.size(), 0.0);
+        least.energy = problem.energy(z, &mut least.gradient);
+        let mut pull = SVector::<f64, R>::zeros();
+        let mut damping = 0.0;
+        self.program.active.clear();
+        problem.evaluate(z, &mut self.residual, &mut self.jacobian);
+        for _ in 0..max_iterations {
+            self.iterations += 1;
+            match self.energy_model(problem, region, z, &least.gradient, &pull, &mut damping) {
+                Outcome::Solved => {}
+                // Bounds and target agree at this point alone: there is no freedom to spend.
+                Outcome::Infeasible if problem.met(&self.residual) => return Ending::Met,
+                Outcome::Infeasible | Outcome::Failed => return Ending::Failed,
+            }
+            pull.fill(0.0);
+            for (&row, multiplier) in self.program.active.iter().zip(&self.program.multipliers) {
+                if row < R {
+                    pull[row] = *multiplier;
+                }
+            }
+            // Strong multipliers carry the rounding of what they multiply.
+            let strongest =
+                self.program.multipliers.iter().fold(1.0_f64, |most, m| most.max(m.abs()));
+            let known = STATIONARY.max(problem.precision());
+            if self.program.lagrangian_gradient(&self.rows) <= known * strongest {
+                return Ending::Met;
+            }
+            if self.step_down(problem, region, z, &pull, ROUNDING * strongest, least) {
+                damping = if damping < DAMPING.0 { 0.0 } else { 0.6 * damping };
+            } else {
+                problem.evaluate(z, &mut self.residual, &mut self.jacobian);
+                damping = (8.0 * damping).max(DAMPING.0);
+                if damping > DAMPING.1 {
+                    break;
+                }
+            }
+        }
+        Ending::IterationLimit
+    }
+
+    /// Takes a share of the model's step that lowers the energy, if there is one; the new point has then
+    /// been evaluated.
+    fn step_down<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        z: &mut Vec<f64>,
+        pull: &SVector<f64, R>,
+        rounding: f64,
+        least: &mut Least,
+    ) -> bool {
+        let Least { energy, gradient, next, next_gradient, program, rows } = least;
+        // The active rows are still needed for the next model: the way back has its own program.
+        std::mem::swap(&mut self.program, program);
+        std::mem::swap(&mut self.rows, rows);
+        let step = &program.step;
+        let longest = step.iter().fold(0.0_f64, |most, p| most.max(p.abs()));
+        let mut share = if longest > STEP { STEP / longest } else { 1.0 };
+        // Residuals within the tolerance are worth this much energy.
+        let merit = *energy + pull.dot(&self.residual);
+        let mut lower = None;
+        for _ in 0..BACKTRACKS {
+            next.clear();
+            next.extend(z.iter().zip(step).map(|(z, p)| z + share * p));
+            let wanted = ARMIJO * share * dot(gradient, step).abs();
+            if region.restore(next, &mut self.inside)
+                && self.descend(problem, region, next, Purpose::Meet, CORRECTIONS) == Ending::Met
+            {
+                let reached = problem.energy(next, next_gradient);
+                if reached + pull.dot(&self.residual) <= merit - wanted + rounding {
+                    lower = Some(reached);
+                    break;
+                }
+            }
+            share *= BACKTRACK;
+        }
+        std::mem::swap(&mut self.program, program);
+        std::mem::swap(&mut self.rows, rows);
+        let Some(reached) = lower else { return false };
+        std::mem::swap(z, next);
+        std::mem::swap(gradient, next_gradient);
+        *energy = reached;
+        true
+    }
+
+    /// Minimises the model of the Lagrangian under the linearised target (the first `R` rows) and region;
+    /// raises the damping until the model is convex where the target leaves freedom.
+    fn energy_model<P: Problem<R>>(
+        &mut self,
+        problem: &mut P,
+        region: &Region,
+        z: &[f64],
+        gradient: &[f64],
+        pull: &SVector<f64, R>,
+        damping: &mut f64,
+    ) -> Outcome {
+        let size = region.size();
+        self.hessian.clear();
+        self.hessian.resize(size * size, 0.0);
+        problem.add_energy_hessian(z, &mut self.hessian);
+        problem.add_hessian(z, pull, &mut self.hessian);
+        region.add_curvature(z, &self.program, R, &mut self.hessian);
+        self.rows.clear();
+        for row in 0..R {
+            let normal = self.rows.push(size, -self.residual[row]);
+            normal.iter_mut().zip(&self.jacobian).for_each(|(n, column)| *n = column[row]);
+        }
+        self.rows.equalities = R;
+        region.linearize(z, &mut self.rows);
+        problem.linearize(&mut self.rows);
+        self.stiffen(size, R);
+        let mut added = 0.0;
+        loop {
+            let shift = damping.max(FLOOR);
+            for i in 0..size {
+                self.hessian[i * (size + 1)] += shift - added;
+            }
+            added = shift;
+            if self.program.factor(&self.hessian, size) {
+                break;
+            }
+            // Little more than it takes: steps along negative curvature should be long.
+            *damping = (2.0 * *damping).max(DAMPING.0);
+            if *damping > DAMPING.1 {
+                return Outcome::Failed;
+            }
+        }
+        self.program.gradient.clear();
+        self.program.gradient.extend_from_slice(gradient);
+        self.program.solve(&self.rows)
+    }
+}

@@ -1,0 +1,4 @@
+//! Design inverses from Python.
+
+pub(crate) mod prebend;
+pub(crate) mod routing;

@@ -1,0 +1,108 @@
+//! `jacobian`: the velocity of the tool point by displacements.
+
+use nalgebra::Matrix6xX;
+use pyo3::prelude::*;
+
+use tdcr::constant_curvature::{self, ConstantCurvature};
+use tdcr::model::Model;
+use tdcr::rod::Scratch;
+use tdcr::{InvalidInput, Status};
+
+use crate::convert::arrays::{frozen, invalid};
+use crate::forward::model_choice::{Choice, rod_only};
+use crate::forward::one_row;
+use crate::forward::rod;
+use crate::forward::shape::Shape;
+use crate::robot::Robot;
+
+/// Velocity of the tool point per metre of tendon displacement.
+///
+/// Parameters
+/// ----------
+/// robot : Robot
+/// displacements : array_like, shape (K,)
+///     As for `forward` [m].
+/// model : {"rod", "constant_curvature"}, optional
+/// settings : RodSettings or ConstantCurvatureSettings, optional
+///     Those of the model.
+/// start : Shape, optional
+///     Where the rod's solve starts, as for `forward`. A shape under these displacements leaves nothing
+///     to solve.
+///
+/// Returns
+/// -------
+/// ndarray, shape (6, K)
+///     Velocity of the tool point [m/m], then angular velocity [rad/m], world axes. Exact; finite
+///     where the robot is straight. Columns of tendons that do not count are zero: free and slack ones of
+///     the rod; of constant curvature, free ones and the only, released one of a segment. A tendon of the
+///     rod that is just as long as it may be, without tension, is followed on its pulled side, where it
+///     moves the tip: so are all tendons at rest, held at 0. That holds for changes that leave all of
+///     these under tension, not for one that lets some go slack: free (`inf`) those. Where taut
+///     tendons depend on each other (three on one inextensible segment) no displacement can change alone: the columns are then those
+///     of the nearest change that the rod can follow.
+///
+/// Raises
+/// ------
+/// InvalidInput
+///     As `forward`, for a model without derivatives, and in constant curvature for displacements that
+///     leave a segment no length or overflow.
+/// NotConverged
+///     The rod's solve did not converge; the shape is its `result`.
+#[pyfunction]
+#[pyo3(signature = (robot, displacements, *, model="rod", settings=None, start=None))]
+pub(crate) fn jacobian(
+    py: Python<'_>,
+    robot: &Bound<'_, Robot>,
+    displacements: &Bound<'_, PyAny>,
+    model: &str,
+    settings: Option<&Bound<'_, PyAny>>,
+    start: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Py<PyAny>> {
+    let choice = Choice::new(model, settings)?;
+    let displacements = one_row(robot, displacements)?;
+    let solved = robot.get();
+    solved.0.check_displacements(&displacements).map_err(|e| invalid(&e))?;
+    let matrix = match choice {
+        Choice::Rod(settings) => {
+            let start = start.map(|start| rod::start(&solved.0, &settings, start)).transpose()?;
+            let plan = solved.rod_plan(settings).map_err(|e| invalid(&e))?;
+            let columns = rod::run(py, &solved.0, &plan, |rod| {
+                let mut work = Scratch::default();
+                let report = match start {
+                    Some(start) => rod.solve_from(&start, &displacements, &mut work)?,
+                    None => rod.solve(&displacements, &mut work)?,
+                };
+                if report.status == Status::Converged {
+                    let sensitivity = rod.sensitivity(&displacements, &work);
+                    return Ok(Ok(sensitivity.jacobian(solved.0.tool())));
+                }
+                Ok(Err(rod.result(&displacements, report, work)))
+            })?;
+            match columns.map_err(|e| invalid(&e))? {
+                Ok(matrix) => matrix,
+                Err(shape) => {
+                    let shape = Shape::new(solved.clone(), choice, displacements, shape);
+                    return Err(Shape::not_converged(&Bound::new(py, shape)?));
+                }
+            }
+        }
+        Choice::Linkage(_) => {
+            let expected = "a model with derivatives (\"rod\" or \"constant_curvature\")";
+            return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
+        }
+        Choice::ConstantCurvature(_) if start.is_some() => return Err(rod_only("start", model)),
+        Choice::ConstantCurvature(settings) => {
+            let plan = solved.constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
+            ConstantCurvature::new(&solved.0, plan)
+                .jacobian(&displacements, &mut constant_curvature::Scratch::default())
+                .map_err(|e| invalid(&e))?
+        }
+    };
+    frozen_columns(py, &matrix)
+}
+
+/// Six rows as a read-only (6, K) array.
+pub(crate) fn frozen_columns(py: Python<'_>, matrix: &Matrix6xX<f64>) -> PyResult<Py<PyAny>> {
+    // Columns of the transpose are the rows.
+    frozen(py, matrix.transpose().as_slice().to_vec(), &[6, matrix.ncols()])
+}

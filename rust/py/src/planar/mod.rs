@@ -1,0 +1,4 @@
+//! Planar trunks from Python.
+
+pub(crate) mod inverse;
+pub(crate) mod trunk;
