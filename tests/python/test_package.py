@@ -13,6 +13,7 @@ import tdcr
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.wheel
 def test_it_is_the_installed_wheel_that_is_tested():
     assert "site-packages" in tdcr.__file__
     assert (Path(tdcr.__file__).parent / "py.typed").exists()
