@@ -6,7 +6,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyTuple, PyType};
+use pyo3::types::{PyTuple, PyType};
 
 use tdcr::lie::Pose;
 use tdcr::{InvalidInput, Status};
@@ -203,15 +203,6 @@ where
         return one.into_bound_py_any(py);
     }
     Ok(PyTuple::new(py, values.iter().copied())?.into_any())
-}
-
-/// A call of a class with keywords, as its repr.
-pub(crate) fn called(class: &str, keywords: &Bound<'_, PyDict>) -> PyResult<String> {
-    let mut given = Vec::new();
-    for (name, value) in keywords {
-        given.push(format!("{name}={}", value.repr()?));
-    }
-    Ok(format!("{class}({})", given.join(", ")))
 }
 
 /// A list for a repr: whole when short, else its ends.
