@@ -28,7 +28,7 @@ fn invalid_class(py: Python<'_>) -> PyResult<Bound<'_, PyType>> {
 pub(crate) fn status(py: Python<'_>, status: Status) -> PyResult<Bound<'_, PyAny>> {
     static MEMBERS: PyOnceLock<[Py<PyAny>; Status::ALL.len()]> = PyOnceLock::new();
     let members = MEMBERS.get_or_try_init(py, || {
-        let class = py.import("tdcr._status")?.getattr("Status")?;
+        let class = py.import("tdcr._base.status")?.getattr("Status")?;
         let mut members = Vec::with_capacity(Status::ALL.len());
         for status in Status::ALL {
             members.push(class.call1((status.as_str(),))?.unbind());

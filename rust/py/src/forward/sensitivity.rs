@@ -199,7 +199,7 @@ impl Sensitivity {
             frozen_points(py, told.velocities.into_iter())?,
             frozen_points(py, told.spins.into_iter())?,
         );
-        py.import("tdcr._sensitivity")?.getattr("Variation")?.call1(fields)
+        py.import("tdcr._forward.sensitivity")?.getattr("Variation")?.call1(fields)
     }
 
     /// Gradient of weighted positions and rotations of the disks by everything at once: of
@@ -247,7 +247,7 @@ impl Sensitivity {
             frozen(py, by.lengths, &[count])?,
             by.poisson_ratio,
         );
-        py.import("tdcr._sensitivity")?.getattr("Gradient")?.call1(fields)
+        py.import("tdcr._forward.sensitivity")?.getattr("Gradient")?.call1(fields)
     }
 
     fn __hash__(&self) -> u64 {

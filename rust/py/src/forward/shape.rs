@@ -301,7 +301,7 @@ impl Shape {
     ///     The file cannot be written.
     #[pyo3(signature = (path))]
     fn save(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
-        slf.py().import("tdcr._saving")?.call_method1("save", (slf, path))?;
+        slf.py().import("tdcr._io.save_load")?.call_method1("save", (slf, path))?;
         Ok(())
     }
 
@@ -323,7 +323,7 @@ impl Shape {
         class: &Bound<'py, PyType>,
         path: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        class.py().import("tdcr._saving")?.call_method1("load", (path, "Shape"))
+        class.py().import("tdcr._io.save_load")?.call_method1("load", (path, "Shape"))
     }
 
     /// Frames in the layout of CRVisToolkit, the plotting toolkit of opencontinuumrobotics.com: the
@@ -373,7 +373,7 @@ impl Shape {
         slf: &Bound<'py, Self>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        slf.py().import("tdcr._plot")?.getattr("plot_shape")?.call((slf,), options)
+        slf.py().import("tdcr._plot.shape")?.getattr("plot_shape")?.call((slf,), options)
     }
 
     /// Equal by value: robot, model, settings, displacements, surroundings and answer.

@@ -177,7 +177,7 @@ impl Robot {
         class: &Bound<'py, PyType>,
         path: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        class.py().import("tdcr._files")?.call_method1("load_robot", (path,))
+        class.py().import("tdcr._io.robot_file")?.call_method1("load_robot", (path,))
     }
 
     /// Writes a robot file (TOML or JSON by its ending) that `load` reads back exactly.
@@ -195,7 +195,7 @@ impl Robot {
     ///     The file cannot be written.
     #[pyo3(signature = (path))]
     fn save(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
-        slf.py().import("tdcr._files")?.call_method1("save_robot", (slf, path))?;
+        slf.py().import("tdcr._io.robot_file")?.call_method1("save_robot", (slf, path))?;
         Ok(())
     }
 

@@ -121,7 +121,7 @@ impl Mesh {
         unit: &Bound<'py, PyAny>,
         inside: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        class.py().import("tdcr._meshes")?.call_method1("load_mesh", (path, unit, inside))
+        class.py().import("tdcr._io.mesh_file")?.call_method1("load_mesh", (path, unit, inside))
     }
 
     /// Vertices, shape (V, 3) [m].
