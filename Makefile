@@ -68,7 +68,7 @@ $(VENV)/equipped: $(VENV)/created pyproject.toml
 
 # The profile of the tests, whose compiled core it shares. Once installed, only the compiled module changes.
 develop: $(VENV)/equipped
-	$(BIN)/maturin develop --quiet --locked --profile test $(if $(wildcard $(VENV)/editable),--skip-install,--extras $(EXTRAS))
+	$(BIN)/maturin develop --locked --profile test $(if $(wildcard $(VENV)/editable),--skip-install,--extras $(EXTRAS))
 	@rm -f $(VENV)/installed
 	@touch $(VENV)/editable
 
@@ -92,7 +92,7 @@ rust-tests: tools
 # they were keep their time, so that cargo compiles no more than what changed.
 package: $(VENV)/equipped
 	rm -rf dist $(SDIST)/new
-	$(BIN)/maturin sdist --quiet --out dist
+	$(BIN)/maturin sdist --out dist
 	mkdir -p $(SDIST)/new
 	tar xmzf dist/tdcr-*.tar.gz --strip-components 1 -C $(SDIST)/new
 	cd $(SDIST)/new && find . -type f | while read file; do \
