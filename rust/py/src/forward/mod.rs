@@ -3,7 +3,6 @@
 pub(crate) mod batch;
 pub(crate) mod jacobian;
 pub(crate) mod model_choice;
-pub(crate) mod rod;
 pub(crate) mod sensitivity;
 pub(crate) mod shape;
 pub(crate) mod shape_parts;

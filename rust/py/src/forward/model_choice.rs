@@ -8,8 +8,9 @@ use tdcr::InvalidInput;
 use tdcr::forward::ModelSettings;
 
 use crate::convert::arrays::{invalid, type_name};
-use crate::forward::rod::RodSettings;
-use crate::settings::{ConstantCurvatureSettings, LinkageSettings};
+use crate::settings::constant_curvature::ConstantCurvatureSettings;
+use crate::settings::linkage::LinkageSettings;
+use crate::settings::rod::RodSettings;
 
 /// Settings as Python knows them.
 pub(crate) fn python_settings(
