@@ -103,12 +103,14 @@ guide: package
 	$(MKDOCS)
 
 # Keeps what is printed, and writes the guide's page of it. QUICK=1 is a short run: it proves that all
-# works, and its figures are rough.
+# works, and its figures are rough. Says which benches are slower than benches/baseline.json by over
+# 15 %, and fails there with CHECK=1.
 bench: SHELL := /bin/bash
 bench: .SHELLFLAGS := -o pipefail -ec
 bench: $(VENV)/installed $(VENV)/developed
 	rm -rf $(TARGET)/bench && mkdir -p $(TARGET)/bench && touch $(TARGET)/bench/started
 	cargo bench --locked -- $(if $(QUICK),--warm-up-time 0.3 --measurement-time 1 --noplot)
+	$(BIN)/python benches/guard.py $(TARGET) $(if $(CHECK),--check)
 	$(BIN)/python benches/python_calls.py | tee $(TARGET)/bench/python_calls.txt
 	for script in benches/peers/*.py; do $(BIN)/python $$script $(if $(QUICK),--quick) \
 		| tee $(TARGET)/bench/$$(basename $$script .py).txt; done
