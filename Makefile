@@ -2,6 +2,7 @@
 # make test   everything that CI runs
 # make bench  criterion benches and side-by-side runs against other tools
 # make figures remakes the papers' figures into examples/figures/
+# make instructions  counts the instructions of five solves, with valgrind
 # make house  counts comments, words and arrows of the code
 # make docs   builds the guide into site/
 
@@ -18,7 +19,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-.PHONY: help demo test bench house figures docs guide tools rust-checks rust-tests package python-checks python-tests runs clean
+.PHONY: help demo test bench instructions house figures docs guide tools rust-checks rust-tests package python-checks python-tests runs clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -79,6 +80,10 @@ python-checks: package
 
 python-tests: package
 	$(BIN)/pytest
+
+# `make instructions COUNT="--write before.json"` keeps the counts, `--against before.json` compares.
+instructions:
+	$(PYTHON) benches/instructions.py $(COUNT)
 
 # Counts and arrows; `make house HOUSE="--list all"` lists the places, `--against COMMIT` compares.
 house:

@@ -11,7 +11,7 @@ use std::hint::black_box;
 
 use nalgebra::Vector3;
 use tdcr::Status;
-use tdcr::inverse::{Bounds, InverseSettings, RodInverse, Target};
+use tdcr::inverse::{Bounds, InverseSettings, Inverter, RodInverse, Target};
 use tdcr::linkage::LinkageSettings;
 use tdcr::linkage::seven_bar::{Hole, SevenBar};
 use tdcr::model::Model;
