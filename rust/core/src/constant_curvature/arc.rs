@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6x3, Vector2, Vector3};
 
-use super::unit_arc::Bent;
+use super::unit_arc::UnitArc;
 use crate::lie::Pose;
 
 /// An arc by its bending vector and its length. The bending vector `kappa * ell * (cos phi, sin phi)`
@@ -54,14 +54,14 @@ impl Arc {
     /// `Rz(phi) [Ry(kappa s) | p(s)] Rz(-phi)`, finite and smooth where it is straight.
     #[must_use]
     pub fn frame(&self, share: f64) -> Pose {
-        Bent::new(self.bend * share).frame(self.length * share)
+        UnitArc::new(self.bend * share).frame(self.length * share)
     }
 
     /// Velocity of the arc's end (translation, then rotation, axes of its base) by the bending vector
     /// and the length \[columns: m and rad per rad, per rad, per m\].
     #[must_use]
     pub fn derivative(&self) -> Matrix6x3<f64> {
-        Bent::new(self.bend).derivative(self.length)
+        UnitArc::new(self.bend).derivative(self.length)
     }
 
     /// Derivative of the bending vector and the length by (kappa, phi, length).

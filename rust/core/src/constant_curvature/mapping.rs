@@ -104,7 +104,7 @@ impl Mapping {
     pub fn fit(&self, displacements: &[f64], length: Length) -> Result<Fit, InvalidInput> {
         let (mut pattern, mut residual) = (Pattern::default(), Vec::new());
         let arc = self.fit_row(displacements, length, &mut pattern, &mut residual)?;
-        let condition = pattern.made.map_or(1.0, |made| made.inverse.condition);
+        let condition = pattern.cached.map_or(1.0, |cached| cached.inverse.condition);
         Ok(Fit { arc, residual, condition })
     }
 
@@ -120,12 +120,12 @@ impl Mapping {
         pattern: &mut Pattern,
         residual: &mut Vec<f64>,
     ) -> Result<Arc, InvalidInput> {
-        self.count(displacements, &mut pattern.counted)?;
+        self.list_active_tendons(displacements, &mut pattern.active)?;
         let known = match length {
             Length::Known(length) => Some(positive("ell", "m", length)?),
-            Length::Free if pattern.counted.len() < 3 => {
+            Length::Free if pattern.active.len() < 3 => {
                 let expected = "a length, or at least three tendons that count";
-                let got = format!("{} tendons", pattern.counted.len());
+                let got = format!("{} tendons", pattern.active.len());
                 return Err(InvalidInput::new("ell", expected, got));
             }
             Length::Free => None,
@@ -144,14 +144,18 @@ impl Mapping {
         }
         let first = residual.len();
         residual.resize(first + self.tendons(), 0.0);
-        for &k in &pattern.counted {
+        for &k in &pattern.active {
             residual[first + k] = displacements[k] - self.displacement(k, &arc, self.rest_length);
         }
         Ok(arc)
     }
 
     /// Tendons that count: not free, and not the only, released one.
-    fn count(&self, displacements: &[f64], counted: &mut Vec<usize>) -> Result<(), InvalidInput> {
+    fn list_active_tendons(
+        &self,
+        displacements: &[f64],
+        active: &mut Vec<usize>,
+    ) -> Result<(), InvalidInput> {
         if displacements.len() != self.tendons() {
             let expected = format!("{} values, one per tendon", self.tendons());
             return Err(InvalidInput::new("displacements", expected, displacements.len()));
@@ -160,20 +164,20 @@ impl Mapping {
             let expected = "finite numbers [m], or inf for a free tendon";
             return Err(InvalidInput::new("displacements", expected, bad));
         }
-        counted.clear();
-        counted.extend((0..self.tendons()).filter(|k| displacements[*k].is_finite()));
-        if let [only] = counted[..]
+        active.clear();
+        active.extend((0..self.tendons()).filter(|k| displacements[*k].is_finite()));
+        if let [only] = active[..]
             && displacements[only] > 0.0
         {
-            counted.clear();
+            active.clear();
         }
         Ok(())
     }
 
     /// Rows of the counted tendons; unknowns are the bend times the mean radius, and the elongation.
-    fn matrix(&self, counted: &[usize], extensible: bool) -> DMatrix<f64> {
-        DMatrix::from_fn(counted.len(), if extensible { 3 } else { 2 }, |row, column| {
-            let k = counted[row];
+    fn matrix(&self, active: &[usize], extensible: bool) -> DMatrix<f64> {
+        DMatrix::from_fn(active.len(), if extensible { 3 } else { 2 }, |row, column| {
+            let k = active[row];
             let arm = self.radii[k] / self.scale;
             match column {
                 0 => -arm * self.directions[k].x,
@@ -187,13 +191,13 @@ impl Mapping {
 /// Which tendons of a row count, and the inverse over them, kept for rows with the same ones.
 #[derive(Clone, Debug, Default)]
 pub struct Pattern {
-    counted: Vec<usize>,
-    made: Option<Made>,
+    active: Vec<usize>,
+    cached: Option<CachedInverse>,
 }
 
 #[derive(Clone, Debug)]
-struct Made {
-    counted: Vec<usize>,
+struct CachedInverse {
+    active: Vec<usize>,
     extensible: bool,
     inverse: PseudoInverse,
 }
@@ -206,23 +210,25 @@ impl Pattern {
         extensible: bool,
         right: impl Fn(usize) -> f64,
     ) -> [f64; 3] {
-        let same = |made: &Made| made.extensible == extensible && made.counted == self.counted;
-        let made = match self.made.take().filter(same) {
-            Some(made) => made,
-            None => Made {
-                counted: self.counted.clone(),
+        let same = |cached: &CachedInverse| {
+            cached.extensible == extensible && cached.active == self.active
+        };
+        let cached = match self.cached.take().filter(same) {
+            Some(cached) => cached,
+            None => CachedInverse {
+                active: self.active.clone(),
                 extensible,
-                inverse: PseudoInverse::new(&mapping.matrix(&self.counted, extensible)),
+                inverse: PseudoInverse::new(&mapping.matrix(&self.active, extensible)),
             },
         };
         let mut unknowns = [0.0; 3];
-        for (column, k) in made.inverse.matrix.column_iter().zip(&self.counted) {
+        for (column, k) in cached.inverse.matrix.column_iter().zip(&self.active) {
             let value = right(*k);
             for (unknown, share) in unknowns.iter_mut().zip(column.iter()) {
                 *unknown += share * value;
             }
         }
-        self.made = Some(made);
+        self.cached = Some(cached);
         unknowns
     }
 }

@@ -77,7 +77,7 @@ pub struct Plan {
     matrix: DMatrix<f64>,
     /// Its inverse when every tendon counts.
     inverse: PseudoInverse,
-    unmoved: Vec<DVector<f64>>,
+    unactuated_directions: Vec<DVector<f64>>,
 }
 
 /// Unknowns of a segment: two bends, and the elongation when it is extensible.
@@ -122,8 +122,8 @@ impl Plan {
             }
         }
         let inverse = PseudoInverse::new(&matrix);
-        let unmoved = null_space(&matrix);
-        Ok(Self { segments, settings, scale, matrix, inverse, unmoved })
+        let unactuated_directions = null_space(&matrix);
+        Ok(Self { segments, settings, scale, matrix, inverse, unactuated_directions })
     }
 
     /// Segments, base first.
@@ -161,53 +161,53 @@ impl Plan {
     }
 
     /// Directions of the matrix's unknowns that no tendon moves; the forward model leaves them at rest.
-    pub(crate) fn unmoved(&self) -> &[DVector<f64>] {
-        &self.unmoved
+    pub(crate) fn unactuated_directions(&self) -> &[DVector<f64>] {
+        &self.unactuated_directions
     }
 
     /// Tendons that count: not free, and not the only, released one of its segment.
-    pub(super) fn counted(&self, displacements: &[f64], counted: &mut Vec<bool>) {
-        counted.clear();
-        counted.extend(displacements.iter().map(|d| d.is_finite()));
+    pub(super) fn mark_active_tendons(&self, displacements: &[f64], active: &mut Vec<bool>) {
+        active.clear();
+        active.extend(displacements.iter().map(|d| d.is_finite()));
         for segment in &self.segments {
-            let mut active = segment.own.iter().filter(|k| counted[**k]);
-            if let (Some(&only), None) = (active.next(), active.next())
+            let mut own = segment.own.iter().filter(|k| active[**k]);
+            if let (Some(&only), None) = (own.next(), own.next())
                 && displacements[only] > 0.0
             {
-                counted[only] = false;
+                active[only] = false;
             }
         }
     }
 
     /// Makes the inverse over the tendons that count, unless it is at hand; columns of the others are
     /// zero.
-    pub(super) fn remember(&self, counted: &[bool], masked: &mut Option<Masked>) {
-        let at_hand = masked.as_ref().is_some_and(|(pattern, _)| pattern == counted);
-        if at_hand || counted.iter().all(|counts| *counts) {
+    pub(super) fn cache_inverse(&self, active: &[bool], masked: &mut Option<MaskedInverse>) {
+        let at_hand = masked.as_ref().is_some_and(|(pattern, _)| pattern == active);
+        if at_hand || active.iter().all(|counts| *counts) {
             return;
         }
         let mut matrix = self.matrix.clone();
-        for (k, _) in counted.iter().enumerate().filter(|(_, counts)| !**counts) {
+        for (k, _) in active.iter().enumerate().filter(|(_, counts)| !**counts) {
             matrix.row_mut(k).fill(0.0);
         }
-        *masked = Some((counted.to_vec(), PseudoInverse::new(&matrix).matrix));
+        *masked = Some((active.to_vec(), PseudoInverse::new(&matrix).matrix));
     }
 
-    /// The inverse over the tendons that count, after [`Plan::remember`].
+    /// The inverse over the tendons that count, after [`Plan::cache_inverse`].
     pub(super) fn inverse_for<'a>(
         &'a self,
-        counted: &[bool],
-        masked: Option<&'a Masked>,
+        active: &[bool],
+        masked: Option<&'a MaskedInverse>,
     ) -> &'a DMatrix<f64> {
         match masked {
-            Some((pattern, inverse)) if pattern == counted => inverse,
+            Some((pattern, inverse)) if pattern == active => inverse,
             _ => &self.inverse.matrix,
         }
     }
 }
 
 /// A pattern of counted tendons and the inverse over them.
-pub(super) type Masked = (Vec<bool>, DMatrix<f64>);
+pub(super) type MaskedInverse = (Vec<bool>, DMatrix<f64>);
 
 fn check_straight(robot: &Robot) -> Result<(), InvalidInput> {
     if !robot.backbone().is_straight() {

@@ -39,7 +39,7 @@ pub trait Inverter: Sync {
     /// Where a solve may start.
     type Start: Clone + Sync;
     /// Buffers of a solve, and what it found.
-    type Work<'w>
+    type Scratch<'w>
     where
         Self: 'w;
 
@@ -68,32 +68,32 @@ pub trait Inverter: Sync {
     ) -> Result<Self::Start, InvalidInput>;
 
     /// Buffers for this inverse; solves end before their next start when the flag is set, if there is one.
-    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Self::Work<'w>;
+    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Self::Scratch<'w>;
 
     /// Seeks what brings the tool to `target`; first from `start`, if given.
     fn solve(
         &self,
         target: &Target,
         start: Option<&Self::Start>,
-        work: &mut Self::Work<'_>,
+        work: &mut Self::Scratch<'_>,
     ) -> Answer;
 
     /// Seeks again from where the last solve in `work` ended, as along a path.
-    fn follow(&self, target: &Target, work: &mut Self::Work<'_>) -> Answer;
+    fn follow(&self, target: &Target, work: &mut Self::Scratch<'_>) -> Answer;
 
     /// The displacements of what the last solve in `work` found \[m\].
-    fn write_displacements(&self, work: &Self::Work<'_>, place: &mut [f64]);
+    fn write_displacements(&self, work: &Self::Scratch<'_>, place: &mut [f64]);
 
     /// Their tensions, in the unit of the results; untouched where the model knows no forces.
-    fn write_tensions(&self, work: &Self::Work<'_>, place: &mut [f64]);
+    fn write_tensions(&self, work: &Self::Scratch<'_>, place: &mut [f64]);
 
     /// The shape that the last solve in `work` found, where displacements do not say which one it is.
-    fn state(&self, _work: &mut Self::Work<'_>) -> Option<State> {
+    fn state(&self, _work: &mut Self::Scratch<'_>) -> Option<State> {
         None
     }
 
     /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
-    fn message(&self, answer: &Answer, work: &Self::Work<'_>) -> String;
+    fn message(&self, answer: &Answer, work: &Self::Scratch<'_>) -> String;
 }
 
 /// Targets are no further from the base than so many lengths of the robot and its tool: rounding would decide.

@@ -96,20 +96,20 @@ const SHORTEST: f64 = 1e-3;
 
 /// Where unknowns may be.
 #[derive(Clone, Debug)]
-pub(super) struct Space {
+pub(super) struct SearchSpace {
     pub(super) region: Region,
     /// The box of swarms, beyond which descents may lead.
     pub(super) lower: Vec<f64>,
     pub(super) upper: Vec<f64>,
 }
 
-/// The region of the unknowns of `Chain`, and where random starts are drawn.
+/// The region of the unknowns of `ArcProblem`, and where random starts are drawn.
 #[derive(Clone, Debug)]
-pub(super) struct Reach {
+pub(super) struct ArcSpace {
     /// Swarms turn no segment by more than half a turn.
-    pub(super) space: Space,
+    pub(super) search: SearchSpace,
     /// Per segment.
-    pub(super) draws: Vec<Draw>,
+    pub(super) draws: Vec<SegmentRange>,
     /// Freedoms that the tendons have and the bounds leave.
     pub(super) freedoms: usize,
     /// Lowest and highest displacement of every tendon \[m\].
@@ -120,7 +120,7 @@ pub(super) struct Reach {
 
 /// Where a segment's unknowns are drawn from.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Draw {
+pub(super) struct SegmentRange {
     /// Largest angle \[rad\].
     pub(super) widest: f64,
     /// Shortest and longest length over the rest length.
@@ -128,7 +128,7 @@ pub(super) struct Draw {
     pub(super) longest: f64,
 }
 
-impl Reach {
+impl ArcSpace {
     pub(super) fn new(
         plan: &Plan,
         bounds: &Bounds,
@@ -136,7 +136,8 @@ impl Reach {
     ) -> Result<Self, InvalidInput> {
         bounds.check(plan, names.len())?;
         let (width, size) = (plan.width(), plan.width() * plan.segment_count());
-        let draws: Vec<Draw> = (0..plan.segment_count()).map(|i| bounds.draw(plan, i)).collect();
+        let draws: Vec<SegmentRange> =
+            (0..plan.segment_count()).map(|i| bounds.segment_range(plan, i)).collect();
         let ranges: Vec<_> = (0..names.len()).map(|k| bounds.displacements(plan, k)).collect();
         let sides = draws.iter().flat_map(|draw| {
             let widest = draw.widest.min(PI);
@@ -144,27 +145,27 @@ impl Reach {
             sides.into_iter().take(width)
         });
         let (lower, upper) = sides.unzip();
-        let mut reach = Self {
-            space: Space { region: Region::new(size), lower, upper },
+        let mut space = Self {
+            search: SearchSpace { region: Region::new(size), lower, upper },
             draws,
             freedoms: 0,
             ranges,
             labels: (Vec::new(), Vec::new()),
         };
-        reach.equate(plan);
+        space.add_equation(plan);
         for i in 0..plan.segment_count() {
-            reach.bound_length(plan, bounds, i);
-            reach.bound_turn(plan, bounds, i);
+            space.bound_length(plan, bounds, i);
+            space.bound_turn(plan, bounds, i);
         }
-        reach.bound_displacements(plan, names);
-        Ok(reach)
+        space.bound_displacements(plan, names);
+        Ok(space)
     }
 
     /// What is no freedom: directions that no tendon moves, straight segments, values held by equal bounds.
-    fn equate(&mut self, plan: &Plan) {
-        let (width, size) = (plan.width(), self.space.region.size());
+    fn add_equation(&mut self, plan: &Plan) {
+        let (width, size) = (plan.width(), self.search.region.size());
         let mut equations: Vec<(Vec<f64>, f64)> = Vec::new();
-        for direction in plan.unmoved() {
+        for direction in plan.unactuated_directions() {
             let normal: Vec<f64> = (0..size).map(|j| direction[j] * plan.unit(j)).collect();
             let at_rest = (0..size).map(|j| normal[j] * rest(plan, j)).sum();
             equations.push((normal, at_rest));
@@ -185,7 +186,7 @@ impl Reach {
         let matrix = DMatrix::from_fn(equations.len(), size, |row, j| equations[row].0[j]);
         self.freedoms = null_space(&matrix).len();
         for (normal, value) in &equations {
-            self.space.region.equate(normal, *value);
+            self.search.region.add_equation(normal, *value);
         }
     }
 
@@ -194,12 +195,12 @@ impl Reach {
         if plan.width() == 2 || draw.shortest == draw.longest {
             return;
         }
-        let mut normal = unit(self.space.region.size(), 3 * i + 2);
-        if self.space.region.bound(&normal, bounds.longest(plan, i)) {
+        let mut normal = unit(self.search.region.size(), 3 * i + 2);
+        if self.search.region.add_bound(&normal, bounds.longest(plan, i)) {
             self.labels.0.push(format!("longest segment {i}"));
         }
         normal[3 * i + 2] = -1.0;
-        if self.space.region.bound(&normal, -draw.shortest) {
+        if self.search.region.add_bound(&normal, -draw.shortest) {
             self.labels.0.push(format!("shortest segment {i}"));
         }
     }
@@ -213,34 +214,34 @@ impl Reach {
         let scale = (plan.width() == 3).then_some(first + 2);
         // Without stretch the smaller of two circles is all there is.
         if radius < if scale.is_some() { f64::INFINITY } else { TURN } {
-            self.space.region.add_disc(Disc { first, radius, scale });
+            self.search.region.add_disc(Disc { first, radius, scale });
             self.labels.1.push(format!("curvature of segment {i}"));
             if scale.is_none() {
                 return;
             }
         }
-        self.space.region.add_disc(Disc { first, radius: TURN, scale: None });
+        self.search.region.add_disc(Disc { first, radius: TURN, scale: None });
         self.labels.1.push(format!("full turn of segment {i}"));
     }
 
     fn bound_displacements(&mut self, plan: &Plan, names: &[String]) {
         for (k, (lower, upper)) in self.ranges.iter().enumerate().filter(|(_, (l, u))| l < u) {
             let (mut row, at_rest) = displacement(plan, k);
-            if self.space.region.bound(&row, upper + at_rest) {
+            if self.search.region.add_bound(&row, upper + at_rest) {
                 self.labels.0.push(format!("release of '{}'", names[k]));
             }
             for entry in &mut row {
                 *entry = -*entry;
             }
-            if self.space.region.bound(&row, -lower - at_rest) {
+            if self.search.region.add_bound(&row, -lower - at_rest) {
                 self.labels.0.push(format!("pull of '{}'", names[k]));
             }
         }
     }
 
     /// The bounds that hold a point back.
-    pub(super) fn holding(&self, point: &[f64]) -> Vec<&str> {
-        let (bounds, discs) = self.space.region.at_edge(point, 1e-9);
+    pub(super) fn active_bounds(&self, point: &[f64]) -> Vec<&str> {
+        let (bounds, discs) = self.search.region.active_at(point, 1e-9);
         let bounds = bounds.into_iter().map(|k| self.labels.0[k].as_str());
         bounds.chain(discs.into_iter().map(|k| self.labels.1[k].as_str())).collect()
     }
@@ -303,7 +304,7 @@ impl Bounds {
         self.length.as_ref().map_or(STRETCH.1, |range| range.at(i).1 / rest)
     }
 
-    fn draw(&self, plan: &Plan, i: usize) -> Draw {
+    fn segment_range(&self, plan: &Plan, i: usize) -> SegmentRange {
         let rest = plan.segment(i).rest_length;
         let (shortest, longest) = match &self.length {
             Some(range) => ((range.at(i).0 / rest).max(SHORTEST), self.longest(plan, i)),
@@ -313,7 +314,7 @@ impl Bounds {
         let widest = TURN.min(self.largest_curvature(i) * rest * longest);
         // Without an upper bound, starts are drawn up to twice the default one.
         let longest = longest.min(2.0 * STRETCH.1 * shortest.max(1.0));
-        Draw { widest, shortest, longest }
+        SegmentRange { widest, shortest, longest }
     }
 
     /// Checks them for a rod.

@@ -3,7 +3,7 @@
 use std::borrow::Borrow;
 
 use super::InverseSettings;
-use super::multistart::Found;
+use super::multistart::SearchOutcome;
 use crate::status::Status;
 
 /// How an inverse ended; what it found is in the workspace.
@@ -24,14 +24,14 @@ pub struct Answer {
 }
 
 impl Answer {
-    pub(super) fn of(found: Found, (distance, angle): (f64, f64)) -> Self {
-        let Found { status, iterations, starts } = found;
+    pub(super) fn of(found: SearchOutcome, (distance, angle): (f64, f64)) -> Self {
+        let SearchOutcome { status, iterations, starts } = found;
         Self { status, distance, angle, iterations, starts }
     }
 
     /// Of a robot of which no shape was found.
-    pub(super) fn shapeless(found: Found) -> Self {
-        Self::of(Found { status: Status::Infeasible, ..found }, (f64::NAN, f64::NAN))
+    pub(super) fn without_shape(found: SearchOutcome) -> Self {
+        Self::of(SearchOutcome { status: Status::Infeasible, ..found }, (f64::NAN, f64::NAN))
     }
 
     /// Of a target that was not sought.
@@ -47,32 +47,32 @@ impl Answer {
 }
 
 /// What stood in the way, in a sentence: the bounds that hold back, and what freedom is spent on.
-pub(super) fn tell<S: Borrow<str>>(
+pub(super) fn message_of<S: Borrow<str>>(
     answer: &Answer,
     settings: &InverseSettings,
-    held: &[S],
+    active: &[S],
     least: &str,
 ) -> String {
     let Answer { distance, angle, .. } = *answer;
     let met = distance <= settings.position_tolerance && angle <= settings.rotation_tolerance;
     let angle = if angle > 0.0 { format!(" and {angle:.2e} rad") } else { String::new() };
     let off = format!("{distance:.2e} m{angle} off the target");
-    let held = if held.is_empty() {
+    let active = if active.is_empty() {
         String::new()
     } else {
-        format!("; at its bound: {}", held.join(", "))
+        format!("; at its bound: {}", active.join(", "))
     };
     match answer.status {
         Status::Converged => String::new(),
         Status::Unreachable => {
-            format!("the nearest answer of {} starts is {off}{held}", answer.starts)
+            format!("the nearest answer of {} starts is {off}{active}", answer.starts)
         }
         Status::Infeasible => "the bounds leave the robot no shape".to_owned(),
         Status::IterationLimit if met => {
             format!("the target is met, but not with the least {least} nearby")
         }
         Status::IterationLimit | Status::NumericalError => {
-            format!("stopped before a nearest answer was found: {off}{held}")
+            format!("stopped before a nearest answer was found: {off}{active}")
         }
     }
 }

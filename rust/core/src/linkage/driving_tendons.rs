@@ -6,7 +6,7 @@ use crate::robot::Robot;
 
 /// The tendons of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Drive {
+pub(super) enum DrivingTendons {
     /// None is pulled.
     None,
     /// One: a four-bar linkage.
@@ -15,7 +15,7 @@ pub(super) enum Drive {
     Two(usize, usize),
 }
 
-impl Drive {
+impl DrivingTendons {
     /// Whether a tendon is part of the linkage.
     pub(super) fn contains(self, tendon: usize) -> bool {
         match self {
@@ -32,12 +32,12 @@ pub(super) struct Run {
     pub(super) first: usize,
     pub(super) last: usize,
     /// How each pair of tendons stands, tendon by tendon.
-    pairs: Vec<Stand>,
+    pairs: Vec<RelativeAzimuth>,
 }
 
 /// How the holes of two tendons stand to each other on the disks of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stand {
+enum RelativeAzimuth {
     /// On different lines through the centre on every disk: they can form a seven-bar.
     Apart,
     /// On (nearly) the same azimuth on some disk.
@@ -63,31 +63,35 @@ pub(super) fn runs(robot: &Robot) -> Vec<Run> {
     let mut first = 0;
     let mut runs = Vec::with_capacity(ends.len());
     for last in ends {
-        runs.push(Run { first, last, pairs: stands(robot, first, last) });
+        runs.push(Run { first, last, pairs: relative_azimuths(robot, first, last) });
         first = last;
     }
     runs
 }
 
-fn stands(robot: &Robot, first: usize, last: usize) -> Vec<Stand> {
+fn relative_azimuths(robot: &Robot, first: usize, last: usize) -> Vec<RelativeAzimuth> {
     let paths = robot.paths();
-    let mut stands = Vec::with_capacity(paths.len() * paths.len());
+    let mut relative_azimuths = Vec::with_capacity(paths.len() * paths.len());
     for a in paths {
         for b in paths {
-            let mut stand = Stand::Apart;
+            let mut azimuths = RelativeAzimuth::Apart;
             if a.end() >= last && b.end() >= last {
                 for disk in first..=last {
                     let (sin, cos) = (b.azimuths[disk] - a.azimuths[disk]).sin_cos();
                     if sin.abs() < ON_ONE_LINE {
-                        stand = if cos > 0.0 { Stand::Same } else { Stand::Opposite };
+                        azimuths = if cos > 0.0 {
+                            RelativeAzimuth::Same
+                        } else {
+                            RelativeAzimuth::Opposite
+                        };
                         break;
                     }
                 }
             }
-            stands.push(stand);
+            relative_azimuths.push(azimuths);
         }
     }
-    stands
+    relative_azimuths
 }
 
 /// By how much a bend breaks a tendon's bound; negative where it leaves slack.
@@ -100,37 +104,42 @@ pub(super) struct Overstretch {
 }
 
 /// What the choice looks at.
-pub(super) struct Choice<'a> {
+pub(super) struct TendonChoice<'a> {
     pub(super) robot: &'a Robot,
     /// Pieces of every tendon, scaled to unit subsegments.
     pub(super) pieces: &'a [Vec<Hole>],
     pub(super) displacements: &'a [f64],
 }
 
-impl Choice<'_> {
+impl TendonChoice<'_> {
     /// The two most-pulled tendons of a run that are not on one line through the centre; with one
     /// pulled tendon, the one whose bound its bend would break, if there is one.
     ///
     /// # Errors
     /// `InvalidInput` when the pulled tendons share one azimuth: a linkage needs two directions.
-    pub(super) fn of(&self, run: &Run) -> Result<Drive, InvalidInput> {
+    pub(super) fn of(&self, run: &Run) -> Result<DrivingTendons, InvalidInput> {
         let tendons = self.displacements.len();
-        let Some(first) = self.most_pulled(run, |_| true) else { return Ok(Drive::None) };
-        let stand = |k: usize| run.pairs[first * tendons + k];
-        if let Some(second) = self.most_pulled(run, |k| k != first && stand(k) == Stand::Apart) {
-            return Ok(Drive::Two(first, second));
+        let Some(first) = self.most_pulled(run, |_| true) else { return Ok(DrivingTendons::None) };
+        let azimuths = |k: usize| run.pairs[first * tendons + k];
+        if let Some(second) =
+            self.most_pulled(run, |k| k != first && azimuths(k) == RelativeAzimuth::Apart)
+        {
+            return Ok(DrivingTendons::Two(first, second));
         }
-        if let Some(twin) = self.most_pulled(run, |k| k != first && stand(k) == Stand::Same) {
+        if let Some(twin) =
+            self.most_pulled(run, |k| k != first && azimuths(k) == RelativeAzimuth::Same)
+        {
             return Err(self.same_azimuth(run, first, twin));
         }
         // The pulled tendon leaves the bend across its own plane open; of those that would be
         // stretched, the one that asks for most of it decides.
-        let taut = (0..tendons)
-            .filter(|&k| k != first && stand(k) == Stand::Apart)
+        let stretched = (0..tendons)
+            .filter(|&k| k != first && azimuths(k) == RelativeAzimuth::Apart)
             .map(|k| (k, self.overstretch(run, first, k)))
             .filter(|(_, asked)| asked.share > BOUND_TOLERANCE)
             .max_by(|a, b| a.1.sideways.total_cmp(&b.1.sideways));
-        Ok(taut.map_or(Drive::One(first), |(second, _)| Drive::Two(first, second)))
+        Ok(stretched
+            .map_or(DrivingTendons::One(first), |(second, _)| DrivingTendons::Two(first, second)))
     }
 
     /// The tendon with the largest shortening in proportion to its length.

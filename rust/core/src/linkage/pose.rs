@@ -33,14 +33,14 @@ impl Pose {
 
     /// Bent by `angle` \[rad\] towards `azimuth` \[rad\] with the link at half the bend.
     #[must_use]
-    pub fn bent(angle: f64, azimuth: f64) -> Self {
+    pub fn from_bend(angle: f64, azimuth: f64) -> Self {
         let (sin, cos) = azimuth.sin_cos();
-        Self::bent_towards(angle, cos, sin)
+        Self::from_bend_towards(angle, cos, sin)
     }
 
     /// The same, towards the unit vector `(cos, sin)`.
     #[must_use]
-    pub(super) fn bent_towards(angle: f64, cos: f64, sin: f64) -> Self {
+    pub(super) fn from_bend_towards(angle: f64, cos: f64, sin: f64) -> Self {
         let (half_sin, half_cos) = (0.5 * angle).sin_cos();
         Self::from_parts(
             Vector3::new(half_sin * cos, half_sin * sin, half_cos),

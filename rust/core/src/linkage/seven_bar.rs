@@ -121,9 +121,9 @@ impl<const M: usize> SevenBar<M> {
         let bend = (c * c + s * s).sqrt();
         // Too small for squares: the direction from the larger component.
         if bend < 1e-140 {
-            return Pose::bent(c.hypot(s), s.atan2(c));
+            return Pose::from_bend(c.hypot(s), s.atan2(c));
         }
-        Pose::bent_towards(third_order(bend), c / bend, s / bend)
+        Pose::from_bend_towards(third_order(bend), c / bend, s / bend)
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use nalgebra::Vector2;
 
 use super::least_energy::descend;
-use super::tip_equations::{HEADING, Problem, Work};
+use super::tip_equations::{HEADING_WEIGHT, Scratch, TipEquations};
 use super::trunk::Trunk;
 use super::two_section::TwoSections;
 use crate::error::{InvalidInput, finite};
@@ -90,7 +90,7 @@ pub fn inverse(
 ) -> Result<Inverse, InvalidInput> {
     let mut solver = Solver::new(trunk, goal, settings)?;
     let starts = solver.search();
-    Ok(solver.answer(starts))
+    Ok(solver.into_inverse(starts))
 }
 
 /// As [`inverse`], until `stop` is set, which is looked at in every step: then there is no answer.
@@ -105,7 +105,7 @@ pub fn inverse_until(
 ) -> Result<Option<Inverse>, InvalidInput> {
     let mut solver = Solver { stop, ..Solver::new(trunk, goal, settings)? };
     let starts = solver.search();
-    Ok((!solver.stopped()).then(|| solver.answer(starts)))
+    Ok((!solver.is_stopped()).then(|| solver.into_inverse(starts)))
 }
 
 /// As [`inverse`], from given turns alone: the least energy near them, or the nearest point.
@@ -124,7 +124,7 @@ pub fn polish(
     if solver.best.is_none() {
         solver.try_nearest(turns);
     }
-    Ok(solver.answer(1))
+    Ok(solver.into_inverse(1))
 }
 
 /// The flag of a search that nobody stops.
@@ -132,12 +132,12 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// The problem, its buffers and the best answers so far.
 pub(super) struct Solver<'a> {
-    pub(super) problem: Problem,
+    pub(super) problem: TipEquations,
     pub(super) heading: Option<f64>,
-    pub(super) whole: f64,
+    pub(super) total_length: f64,
     pub(super) settings: &'a InverseSettings,
     pub(super) stop: &'a AtomicBool,
-    pub(super) work: Work,
+    pub(super) work: Scratch,
     pub(super) iterations: usize,
     /// Energy, whether it is stationary, turns.
     pub(super) best: Option<(f64, bool, Vec<f64>)>,
@@ -167,24 +167,24 @@ impl<'a> Solver<'a> {
             let expected = "turns above 0 and up to 2 pi [rad]";
             return Err(InvalidInput::new("limit", expected, format!("{bad:?}")));
         }
-        let whole: f64 = trunk.lengths().iter().sum();
-        let lengths = trunk.lengths().iter().map(|length| length / whole).collect();
-        let target = super::chord::Point::new(x / whole, y / whole);
-        let problem = Problem { lengths, limits, target, heading };
+        let total_length: f64 = trunk.lengths().iter().sum();
+        let lengths = trunk.lengths().iter().map(|length| length / total_length).collect();
+        let target = super::chord::Point::new(x / total_length, y / total_length);
+        let problem = TipEquations { lengths, limits, target, heading };
         Ok(Self {
             problem,
             heading,
-            whole,
+            total_length,
             settings,
             stop: &NEVER,
-            work: Work::default(),
+            work: Scratch::default(),
             iterations: 0,
             best: None,
             nearest: None,
         })
     }
 
-    fn stopped(&self) -> bool {
+    fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
@@ -221,8 +221,8 @@ impl<'a> Solver<'a> {
             let Ok(two) = TwoSections::new(l1, l2, std::f64::consts::TAU) else { continue };
             two.solutions(self.problem.target.re, self.problem.target.im, &mut found);
             for turns in &found {
-                let spread = |(group, (turn, whole)): (&[f64], (f64, f64))| {
-                    group.iter().map(move |l| turn * l / whole).collect::<Vec<f64>>()
+                let spread = |(group, (turn, group_length)): (&[f64], (f64, f64))| {
+                    group.iter().map(move |l| turn * l / group_length).collect::<Vec<f64>>()
                 };
                 let parts = groups.into_iter().zip([(turns[0], l1), (turns[1], l2)]);
                 starts.push(parts.flat_map(spread).collect());
@@ -271,19 +271,21 @@ impl<'a> Solver<'a> {
     }
 
     pub(super) fn try_start(&mut self, start: &[f64]) {
-        if self.stopped() {
+        if self.is_stopped() {
             return;
         }
         self.unwind(start);
         let mut turns = start.to_vec();
-        self.work.held.clear();
-        if self.problem.reach(&mut turns, &mut self.work) * self.whole > self.settings.tolerance {
+        self.work.fixed.clear();
+        if self.problem.move_onto_target(&mut turns, &mut self.work) * self.total_length
+            > self.settings.tolerance
+        {
             return;
         }
         let (stationary, steps) = descend(
             &self.problem,
             &mut turns,
-            self.settings.tolerance / self.whole,
+            self.settings.tolerance / self.total_length,
             self.settings.max_iterations,
             self.stop,
             &mut self.work,
@@ -296,38 +298,38 @@ impl<'a> Solver<'a> {
     }
 
     pub(super) fn try_nearest(&mut self, start: &[f64]) {
-        if self.stopped() {
+        if self.is_stopped() {
             return;
         }
         self.unwind(start);
         let mut turns = start.to_vec();
-        let (miss, flat) = self.problem.approach(&mut turns, &mut self.work);
+        let (miss, flat) = self.problem.minimize_miss(&mut turns, &mut self.work);
         if self.nearest.as_ref().is_none_or(|(least, _, _)| miss < least * (1.0 - 1e-12)) {
             self.nearest = Some((miss, flat, turns));
         }
     }
 
-    pub(super) fn answer(mut self, starts: usize) -> Inverse {
-        let (converged, settled, turns) = match (self.best.take(), self.nearest.take()) {
-            (Some((_, settled, turns)), _) => (true, settled, turns),
-            (None, Some((_, settled, turns))) => (false, settled, turns),
+    pub(super) fn into_inverse(mut self, starts: usize) -> Inverse {
+        let (converged, stationary, turns) = match (self.best.take(), self.nearest.take()) {
+            (Some((_, stationary, turns)), _) => (true, stationary, turns),
+            (None, Some((_, stationary, turns))) => (false, stationary, turns),
             (None, None) => (false, false, vec![0.0; self.problem.lengths.len()]),
         };
         self.unwind(&turns);
         let off = self.problem.linearize(&turns, &mut self.work);
-        let error = self.whole * off.x.hypot(off.y);
-        let miss = self.whole * off.norm();
+        let error = self.total_length * off.x.hypot(off.y);
+        let miss = self.total_length * off.norm();
         // A nearest point may turn out to be the target.
         let converged = converged || miss <= self.settings.tolerance;
-        let status = match (converged, settled) {
+        let status = match (converged, stationary) {
             (true, true) => Status::Converged,
             (false, true) => Status::Unreachable,
             (_, false) => Status::IterationLimit,
         };
         Inverse {
             error,
-            heading_error: off.z / HEADING,
-            energy: self.problem.energy(&turns) / self.whole,
+            heading_error: off.z / HEADING_WEIGHT,
+            energy: self.problem.energy(&turns) / self.total_length,
             turns,
             status,
             iterations: self.iterations,

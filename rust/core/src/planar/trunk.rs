@@ -39,7 +39,7 @@ pub struct Trunk {
 
 /// Turns that cables give, and what of the cables is not used.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bent {
+pub struct CableTurns {
     /// Turn of every section \[rad\].
     pub turns: Vec<f64>,
     /// Mean cable length minus the one that fits the section, per section \[m\].
@@ -89,12 +89,12 @@ impl Trunk {
     /// # Errors
     /// `InvalidInput` for another number of pairs than sections, a length that is not positive, or
     /// chords that differ by more than twice the cable distance.
-    pub fn turns(&self, cables: &[[f64; 2]], reading: Cables) -> Result<Bent, InvalidInput> {
+    pub fn turns(&self, cables: &[[f64; 2]], reading: Cables) -> Result<CableTurns, InvalidInput> {
         if cables.len() != self.lengths.len() {
             let expected = format!("{} pairs (l1, l2), one per section", self.lengths.len());
             return Err(InvalidInput::new("cable_lengths", expected, cables.len()));
         }
-        let mut bent = Bent { turns: Vec::new(), misfit: Vec::new() };
+        let mut bent = CableTurns { turns: Vec::new(), misfit: Vec::new() };
         for (i, (&[l1, l2], section)) in cables.iter().zip(&self.lengths).enumerate() {
             for (k, cable) in [l1, l2].into_iter().enumerate() {
                 positive(&format!("cable_lengths[{i}][{k}]"), "m", cable)?;

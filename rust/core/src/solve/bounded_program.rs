@@ -4,7 +4,7 @@
 //! Variables leave their bounds one by one, so that ones that depend on those already free stay where they
 //! are: a singular matrix, as of tendons of which some are slack, costs no precision.
 
-use super::quadratic_program::{backward, cholesky, forward};
+use super::dense::{backward, cholesky, forward};
 
 /// Gradients below this share of the largest linear term that pulls a variable off its bound count as zero: how far
 /// others are pushed onto theirs does not round those.
@@ -12,7 +12,7 @@ const FLAT: f64 = 1e-14;
 
 /// Buffers, and the answer.
 #[derive(Clone, Debug, Default)]
-pub struct Bounded {
+pub struct BoundedProgram {
     /// The minimiser.
     pub step: Vec<f64>,
     /// Free variables, in the order of the factor.
@@ -21,7 +21,7 @@ pub struct Bounded {
     trial: Vec<f64>,
 }
 
-impl Bounded {
+impl BoundedProgram {
     /// Minimises `x·M x / 2 − right·x` subject to `x ≥ lower`, where `lower ≤ 0`, from zero; variables with
     /// `first` start free. `matrix` is symmetric, row by row, of which the lower triangle is read. False when
     /// the arithmetic breaks down or the active set goes on changing.

@@ -1,7 +1,8 @@
 //! Convex regions of unknowns: linear equations and bounds, and discs whose radius may grow with one of
 //! the unknowns.
 
-use super::quadratic_program::{Outcome, Quadratic, Rows, dot};
+use super::dense::dot;
+use super::quadratic_program::{Outcome, QuadraticProgram, Rows};
 
 /// `|(z_first, z_first+1)| <= radius`, or `<= radius * z_scale`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +23,7 @@ impl Disc {
     }
 
     /// Length of the gradient of the excess: normals of rows are of length 1.
-    fn slope(&self) -> f64 {
+    fn gradient_norm(&self) -> f64 {
         if self.scale.is_some() { 1.0_f64.hypot(self.radius) } else { 1.0 }
     }
 }
@@ -64,18 +65,18 @@ impl Region {
     }
 
     /// Adds `normal . z = value`; equations come before everything else. A normal of zeros is left out.
-    pub fn equate(&mut self, normal: &[f64], value: f64) {
-        if self.push(normal, value) {
+    pub fn add_equation(&mut self, normal: &[f64], value: f64) {
+        if self.push_row(normal, value) {
             self.linear.equalities += 1;
         }
     }
 
     /// Adds `normal . z <= bound`, unless the bound is infinite or the normal zero; returns whether.
-    pub fn bound(&mut self, normal: &[f64], bound: f64) -> bool {
-        bound < f64::INFINITY && self.push(normal, bound)
+    pub fn add_bound(&mut self, normal: &[f64], bound: f64) -> bool {
+        bound < f64::INFINITY && self.push_row(normal, bound)
     }
 
-    fn push(&mut self, normal: &[f64], value: f64) -> bool {
+    fn push_row(&mut self, normal: &[f64], value: f64) -> bool {
         let norm = dot(normal, normal).sqrt();
         if norm > 0.0 {
             let row = self.linear.push(self.size, value / norm);
@@ -91,7 +92,7 @@ impl Region {
 
     /// Bounds, in the order they were added, and discs, in theirs, on whose edge a point lies to `within`.
     #[must_use]
-    pub fn at_edge(&self, z: &[f64], within: f64) -> (Vec<usize>, Vec<usize>) {
+    pub fn active_at(&self, z: &[f64], within: f64) -> (Vec<usize>, Vec<usize>) {
         let first = self.linear.equalities;
         let bounds = (first..self.linear.offsets.len())
             .filter(|k| {
@@ -110,7 +111,7 @@ impl Region {
             let off = dot(self.linear.normal(self.size, k), z) - offset;
             if k < self.linear.equalities { off.abs() } else { off }
         });
-        let discs = self.discs.iter().map(|disc| disc.excess(z) / disc.slope());
+        let discs = self.discs.iter().map(|disc| disc.excess(z) / disc.gradient_norm());
         linear.chain(discs).fold(0.0, f64::max)
     }
 
@@ -130,20 +131,26 @@ impl Region {
             } else {
                 (0.0, 0.0)
             };
-            let slope = disc.slope();
-            let row = rows.push(self.size, -disc.excess(z) / slope);
-            row[disc.first] = x / slope;
-            row[disc.first + 1] = y / slope;
+            let gradient_norm = disc.gradient_norm();
+            let row = rows.push(self.size, -disc.excess(z) / gradient_norm);
+            row[disc.first] = x / gradient_norm;
+            row[disc.first + 1] = y / gradient_norm;
             if let Some(scale) = disc.scale {
-                row[scale] = -disc.radius / slope;
+                row[scale] = -disc.radius / gradient_norm;
             }
         }
     }
 
     /// Adds the curvature of the discs that are active in `solved` to the lower triangle of a Hessian at
-    /// `z`: the second derivatives of `sum multiplier * excess / slope`. Its program had `before` rows
+    /// `z`: the second derivatives of `sum multiplier * excess / gradient_norm`. Its program had `before` rows
     /// before those of this region.
-    pub fn add_curvature(&self, z: &[f64], solved: &Quadratic, before: usize, hessian: &mut [f64]) {
+    pub fn add_curvature(
+        &self,
+        z: &[f64],
+        solved: &QuadraticProgram,
+        before: usize,
+        hessian: &mut [f64],
+    ) {
         let linear = before + self.linear.offsets.len();
         for (&row, multiplier) in solved.active.iter().zip(&solved.multipliers) {
             let Some(disc) = row.checked_sub(linear).and_then(|k| self.discs.get(k)) else {
@@ -153,7 +160,7 @@ impl Region {
             let norm = length(z, i);
             if norm > 0.0 {
                 let (x, y) = (z[i] / norm, z[j] / norm);
-                let weight = multiplier / (norm * disc.slope());
+                let weight = multiplier / (norm * disc.gradient_norm());
                 hessian[i * self.size + i] += weight * y * y;
                 hessian[j * self.size + i] -= weight * x * y;
                 hessian[j * self.size + j] += weight * x * x;
@@ -169,13 +176,13 @@ impl Region {
 
     /// Brings a point back into the region by steps of least length; false when the region is empty as
     /// far as this can tell. A point inside stays as it is, bit by bit.
-    pub fn restore(&self, z: &mut [f64], work: &mut Restoring) -> bool {
+    pub fn restore(&self, z: &mut [f64], work: &mut RestoreScratch) -> bool {
         // Tangents to discs converge like Newton's method.
         for _ in 0..30 {
             if self.contains(z) {
                 return true;
             }
-            if !self.return_by(z, work, |_| {}) {
+            if !self.restoring_step(z, work, |_| {}) {
                 return false;
             }
         }
@@ -183,13 +190,13 @@ impl Region {
     }
 
     /// One such step, under further rows; false when no step meets them all.
-    pub fn return_by(
+    pub fn restoring_step(
         &self,
         z: &mut [f64],
-        work: &mut Restoring,
+        work: &mut RestoreScratch,
         further: impl FnOnce(&mut Rows),
     ) -> bool {
-        let Restoring { program, rows } = work;
+        let RestoreScratch { program, rows } = work;
         rows.clear();
         self.linearize(z, rows);
         further(rows);
@@ -206,7 +213,7 @@ impl Region {
 
 /// Buffers of [`Region::restore`].
 #[derive(Clone, Debug, Default)]
-pub struct Restoring {
-    program: Quadratic,
+pub struct RestoreScratch {
+    program: QuadraticProgram,
     rows: Rows,
 }

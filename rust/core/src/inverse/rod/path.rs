@@ -1,10 +1,11 @@
 //! From target to target along a path.
 
-use super::{RodInverse, RodScratch, ended};
+use super::{RodInverse, RodScratch};
 use crate::inverse::Target;
-use crate::inverse::bounds::Space;
-use crate::inverse::multistart::{Effort, Found, Freedom};
+use crate::inverse::bounds::SearchSpace;
+use crate::inverse::multistart::{Freedom, SearchOptions, SearchOutcome};
 use crate::inverse::outcome::Answer;
+use crate::inverse::tension_problem::evaluate_answer;
 use crate::status::Status;
 
 /// Along a path no unknown changes by more in one step \[rad\], and no step is a smaller share of the way between two
@@ -20,10 +21,10 @@ const FEW: usize = 16;
 
 /// Where a step along a path led.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Gone {
-    There,
+enum StepOutcome {
+    Reached,
     Jumped,
-    Astray,
+    Failed,
 }
 
 impl RodScratch<'_> {
@@ -31,34 +32,34 @@ impl RodScratch<'_> {
     /// where it was.
     fn descend(
         &mut self,
-        space: &Space,
-        effort: Effort<'_>,
+        space: &SearchSpace,
+        options: SearchOptions<'_>,
         (from, limit): (&[f64], f64),
         iterations: &mut usize,
-    ) -> Gone {
-        let found = self.search.run(&mut self.pull, space, effort, |_, _| {});
+    ) -> StepOutcome {
+        let found = self.search.run(&mut self.problem, space, options, |_, _| {});
         *iterations += found.iterations;
         let pairs = self.search.point.iter().zip(from);
         let moved = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
         match found.status {
-            Status::Converged if moved <= limit => Gone::There,
-            Status::Converged => Gone::Jumped,
-            _ => Gone::Astray,
+            Status::Converged if moved <= limit => StepOutcome::Reached,
+            Status::Converged => StepOutcome::Jumped,
+            _ => StepOutcome::Failed,
         }
     }
 }
 
 impl RodInverse<'_> {
     /// Goes from the point at hand to the target aimed at; nothing where steps do not lead there.
-    pub(super) fn walk(&self, work: &mut RodScratch<'_>) -> Option<Answer> {
-        let effort = Effort { fall_back: false, nearest: false, ..self.effort(1) };
-        let (from, to) = (work.pull.rod.motion().tool, work.pull.aim.aim.target());
+    pub(super) fn track_in_steps(&self, work: &mut RodScratch<'_>) -> Option<Answer> {
+        let options = SearchOptions { fall_back: false, nearest: false, ..self.options(1) };
+        let (from, to) = (work.problem.rod.motion().tool, work.problem.goal.pose_residual.target());
         let (mut done, mut stride, mut iterations) = (0.0, 1.0_f64, 0);
-        let way = work.pull.aim.aim.way(&from, &to);
+        let way = work.problem.goal.pose_residual.relative_distance(&from, &to);
         let mut last = work.search.point.clone();
         while done < 1.0 {
             let next = (done + stride).min(1.0);
-            work.pull.aim.aim.between(&from, &to, next);
+            work.problem.goal.pose_residual.interpolate_target(&from, &to, next);
             if stride >= 1.0
                 && let Some((point, place)) = &work.before
             {
@@ -70,52 +71,54 @@ impl RodInverse<'_> {
                     pairs.for_each(|(own, before)| *own += share * (*own - before));
                 }
             }
-            let limit = if effort.freedom == Freedom::None {
+            let limit = if options.freedom == Freedom::None {
                 JUMP
             } else {
                 JUMP.min(RATE * way * (next - done))
             };
-            let mut gone = work.descend(&self.space, effort, (&last, limit), &mut iterations);
-            if gone == Gone::Jumped && effort.freedom != Freedom::None {
+            let mut step = work.descend(&self.space, options, (&last, limit), &mut iterations);
+            if step == StepOutcome::Jumped && options.freedom != Freedom::None {
                 // The branch of least tensions may end or turn away here: on without.
                 work.search.point.clone_from(&last);
-                let as_it_is = Effort { freedom: Freedom::None, ..effort };
-                gone = work.descend(&self.space, as_it_is, (&last, JUMP), &mut iterations);
+                let as_it_is = SearchOptions { freedom: Freedom::None, ..options };
+                step = work.descend(&self.space, as_it_is, (&last, JUMP), &mut iterations);
             }
-            if gone == Gone::There {
+            if step == StepOutcome::Reached {
                 (done, stride) = (next, 2.0 * stride);
                 last.clone_from(&work.search.point);
             } else {
                 work.search.point.clone_from(&last);
                 stride = 0.5 * (next - done);
-                if stride < SHORTEST || work.search.stopped() {
+                if stride < SHORTEST || work.search.is_stopped() {
                     return None;
                 }
             }
         }
-        let found = Found { status: Status::Converged, iterations, starts: 1 };
-        Some(ended(found, &mut work.pull, &mut work.search, |goal| goal.aim.misses()))
+        let found = SearchOutcome { status: Status::Converged, iterations, starts: 1 };
+        Some(evaluate_answer(found, &mut work.problem, &mut work.search, |goal| {
+            goal.pose_residual.errors()
+        }))
     }
 
     /// From the row before, or from a few starts where that does not lead there.
-    pub(super) fn go_on(&self, target: &Target, work: &mut RodScratch<'_>) -> Answer {
-        if let Some(rise) = &work.rise {
-            rise.slacken(&mut work.pull);
+    pub(super) fn track(&self, target: &Target, work: &mut RodScratch<'_>) -> Answer {
+        if let Some(from_rest) = &work.from_rest {
+            from_rest.allow_slack(&mut work.problem);
         }
-        let few = self.effort(self.settings.starts.min(FEW));
+        let few = self.options(self.settings.starts.min(FEW));
         if !work.met {
             let given = work.search.point.len() == self.units.len();
-            return self.search(target, given, Effort { fall_back: false, ..few }, work);
+            return self.search(target, given, SearchOptions { fall_back: false, ..few }, work);
         }
-        let here = (work.search.point.clone(), work.pull.rod.motion().tool.translation);
-        work.pull.aim.aim.at(*target);
-        if let Some(answer) = self.walk(work) {
+        let here = (work.search.point.clone(), work.problem.rod.motion().tool.translation);
+        work.problem.goal.pose_residual.set_target(*target);
+        if let Some(answer) = self.track_in_steps(work) {
             work.before = Some(here);
             return answer;
         }
         work.search.point = here.0;
-        work.search.fit.evaluate(&mut work.pull, &work.search.point);
-        let answer = self.search(target, true, Effort { fall_back: false, ..few }, work);
+        work.search.solver.evaluate(&mut work.problem, &work.search.point);
+        let answer = self.search(target, true, SearchOptions { fall_back: false, ..few }, work);
         Answer { starts: answer.starts + 1, ..answer }
     }
 }

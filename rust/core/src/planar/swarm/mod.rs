@@ -9,10 +9,12 @@ mod cost;
 mod objective;
 mod result;
 mod search;
+mod watch;
 
 pub use batch::{Row, Rows, solve_rows};
 pub use result::SwarmInverse;
-pub use search::{SwarmSolver, WatchDecision};
+pub use search::SwarmSolver;
+pub use watch::WatchDecision;
 
 use super::newton_inverse::InverseSettings;
 use crate::error::InvalidInput;

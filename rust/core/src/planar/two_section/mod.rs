@@ -67,18 +67,18 @@ impl TwoSections {
         if target.norm().is_nan() || target.norm() > 1.0 + EDGE {
             return 0;
         }
-        let mut search = Search { tip, target, found, looks: 0 };
+        let mut search = Search { tip, target, found, interval_count: 0 };
         search.run();
         if target.norm() < CORNER {
             search.corners();
         }
-        let looks = search.looks;
-        self.keep(tip, target, found);
-        looks
+        let interval_count = search.interval_count;
+        self.select_solutions(tip, target, found);
+        interval_count
     }
 
     /// Clamps to the limit, drops what then misses the target and what is there twice, and sorts.
-    fn keep(&self, tip: Tip, target: Point, found: &mut Vec<[f64; 2]>) {
+    fn select_solutions(&self, tip: Tip, target: Point, found: &mut Vec<[f64; 2]>) {
         if target.norm() <= EDGE {
             // Both sections closed circles: every corner of the square of turns.
             found.extend([[TAU, TAU], [TAU, -TAU], [-TAU, TAU], [-TAU, -TAU]]);
@@ -88,7 +88,7 @@ impl TwoSections {
             if turns.iter().all(|turn| turn.abs() <= limit) {
                 return true;
             }
-            *turns = tip.within(*turns, limit, target);
+            *turns = tip.clamp_to_limit(*turns, limit, target);
             (tip.at(*turns).0 - target).norm() <= 5.0 * EDGE
         });
         let mut kept = 0;

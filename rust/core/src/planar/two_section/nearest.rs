@@ -2,7 +2,7 @@
 
 use super::TwoSections;
 use crate::planar::chord::Point;
-use crate::planar::tip_equations::{Problem, Work};
+use crate::planar::tip_equations::{Scratch, TipEquations};
 
 /// Turns per section of the grid that the search starts from.
 const GRID: usize = 41;
@@ -34,7 +34,7 @@ impl TwoSections {
             let tip = self.tip(turns);
             return (turns, (tip.x - x).hypot(tip.y - y));
         }
-        let problem = Problem {
+        let problem = TipEquations {
             lengths: vec![l1 / whole, l2 / whole],
             limits: vec![limit; 2],
             target: Point::new(x / whole, y / whole),
@@ -47,10 +47,10 @@ impl TwoSections {
             distances.push((tip.x - x).hypot(tip.y - y));
         }
         let mut best = ([0.0; 2], f64::INFINITY);
-        let mut work = Work::default();
+        let mut work = Scratch::default();
         for start in minima(&distances) {
             let mut turns = vec![turn(start / GRID), turn(start % GRID)];
-            let (miss, _) = problem.approach(&mut turns, &mut work);
+            let (miss, _) = problem.minimize_miss(&mut turns, &mut work);
             if miss * whole < best.1 {
                 best = ([turns[0], turns[1]], miss * whole);
             }

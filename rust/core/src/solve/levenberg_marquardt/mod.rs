@@ -11,9 +11,10 @@ mod least_energy;
 
 use nalgebra::SVector;
 
-use crate::solve::convex_region::{Region, Restoring};
-use crate::solve::quadratic_program::{Outcome, Quadratic, Rows, dot};
-use least_energy::Least;
+use crate::solve::convex_region::{Region, RestoreScratch};
+use crate::solve::dense::dot;
+use crate::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
+use least_energy::LeastEnergy;
 
 /// Residuals of `R` rows, and an energy that chooses among the points where they vanish.
 pub trait Problem<const R: usize> {
@@ -26,10 +27,10 @@ pub trait Problem<const R: usize> {
     );
 
     /// The squared residuals alone.
-    fn squared(&mut self, z: &[f64]) -> f64;
+    fn squared_norm(&mut self, z: &[f64]) -> f64;
 
     /// Whether residuals are as small as wanted.
-    fn met(&self, residual: &SVector<f64, R>) -> bool;
+    fn is_met(&self, residual: &SVector<f64, R>) -> bool;
 
     /// Adds the second derivatives of `weights . r` to the lower triangle of a matrix, row by row, at `z`,
     /// the point evaluated last.
@@ -38,18 +39,18 @@ pub trait Problem<const R: usize> {
     /// Forgets where it was, for problems whose values depend on that: what follows begins anew.
     fn restart(&mut self) {}
 
-    /// Keeps where it is, for [`Self::go_back`].
-    fn keep(&mut self) {}
+    /// Keeps where it is, for [`Self::restore_state`].
+    fn save_state(&mut self) {}
 
     /// Back to where it was kept.
-    fn go_back(&mut self) {}
+    fn restore_state(&mut self) {}
 
     /// Adds bounds on functions of the unknowns, as rows for a step from the point evaluated last; there are
     /// none unless this is defined.
     fn linearize(&self, _rows: &mut Rows) {}
 
     /// Whether there are any.
-    fn bounded(&self) -> bool {
+    fn has_bounds(&self) -> bool {
         false
     }
 
@@ -125,15 +126,15 @@ pub struct Scratch<const R: usize> {
     /// Residuals at the last point.
     pub residual: SVector<f64, R>,
     pub(super) jacobian: Vec<SVector<f64, R>>,
-    pub(super) program: Quadratic,
+    pub(super) program: QuadraticProgram,
     pub(super) rows: Rows,
     pub(super) hessian: Vec<f64>,
     pub(super) trial: Vec<f64>,
     trial_residual: SVector<f64, R>,
     trial_jacobian: Vec<SVector<f64, R>>,
     /// Of the programs that bring points back: the active rows of the last model are still needed.
-    pub(super) inside: Restoring,
-    least: Least,
+    pub(super) restoring: RestoreScratch,
+    least_energy: LeastEnergy,
     /// Rows along which no step is wanted, orthonormal.
     basis: Vec<f64>,
 }
@@ -144,14 +145,14 @@ impl<const R: usize> Default for Scratch<R> {
             iterations: 0,
             residual: SVector::zeros(),
             jacobian: Vec::new(),
-            program: Quadratic::default(),
+            program: QuadraticProgram::default(),
             rows: Rows::default(),
             hessian: Vec::new(),
             trial: Vec::new(),
             trial_residual: SVector::zeros(),
             trial_jacobian: Vec::new(),
-            inside: Restoring::default(),
-            least: Least::default(),
+            restoring: RestoreScratch::default(),
+            least_energy: LeastEnergy::default(),
             basis: Vec::new(),
         }
     }
@@ -160,7 +161,7 @@ impl<const R: usize> Default for Scratch<R> {
 impl<const R: usize> Scratch<R> {
     /// Brings a point into the region; false when the region is empty as far as this can tell.
     pub fn restore(&mut self, region: &Region, z: &mut [f64]) -> bool {
-        region.restore(z, &mut self.inside)
+        region.restore(z, &mut self.restoring)
     }
 
     /// Evaluates the problem at a point.
@@ -182,7 +183,7 @@ impl<const R: usize> Scratch<R> {
         self.evaluate(problem, z);
         if problem.violation() > WITHIN {
             let (mut residual, mut jacobian) = (self.residual, std::mem::take(&mut self.jacobian));
-            let inside = self.come_back(problem, region, z, &mut residual, &mut jacobian);
+            let inside = self.return_inside(problem, region, z, &mut residual, &mut jacobian);
             (self.residual, self.jacobian) = (residual, jacobian);
             if !inside {
                 return Ending::Failed;
@@ -192,27 +193,27 @@ impl<const R: usize> Scratch<R> {
         let (mut damping, mut idle) = (DAMPING, 0);
         self.program.active.clear();
         for _ in 0..max_iterations {
-            if problem.met(&self.residual) {
+            if problem.is_met(&self.residual) {
                 return Ending::Met;
             }
             if !squared.is_finite() {
                 return Ending::Failed;
             }
             self.iterations += 1;
-            if !self.model(problem, region, z, purpose, &mut damping) {
+            if !self.solve_model(problem, region, z, purpose, &mut damping) {
                 return Ending::Failed;
             }
             if purpose == Purpose::Nearest && self.stationary(squared, problem.precision()) {
                 return Ending::Stalled;
             }
-            let lower = self.accept(problem, region, z, squared);
+            let lower = self.try_step(problem, region, z, squared);
             if let Some(lower) = lower {
                 idle = if lower > (1.0 - HEADWAY) * squared { idle + 1 } else { 0 };
                 squared = lower;
                 damping *= 0.2;
             } else {
                 damping = (8.0 * damping).max(1e-9);
-                if purpose == Purpose::Nearest || problem.bounded() {
+                if purpose == Purpose::Nearest || problem.has_bounds() {
                     // Second derivatives and bounds are those of the point evaluated last.
                     self.evaluate(problem, z);
                 }
@@ -222,12 +223,12 @@ impl<const R: usize> Scratch<R> {
                 return Ending::Stalled;
             }
         }
-        if problem.met(&self.residual) { Ending::Met } else { Ending::IterationLimit }
+        if problem.is_met(&self.residual) { Ending::Met } else { Ending::IterationLimit }
     }
 
     /// Minimises the damped model under the linearised constraints; raises the damping until the model is
     /// convex.
-    fn model<P: Problem<R>>(
+    fn solve_model<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
@@ -244,7 +245,7 @@ impl<const R: usize> Scratch<R> {
             self.rows.clear();
             region.linearize(z, &mut self.rows);
             problem.linearize(&mut self.rows);
-            self.stiffen(size, 0);
+            self.penalize_rows(size, 0);
         }
         let squared = self.residual.norm_squared();
         let mut added = 0.0;
@@ -267,7 +268,7 @@ impl<const R: usize> Scratch<R> {
         self.trial.extend(z.iter().zip(&self.program.step).map(|(z, p)| z + p));
         // A point inside satisfies every tangent too.
         let inside = region.contains(&self.trial);
-        if inside && !problem.bounded() {
+        if inside && !problem.has_bounds() {
             return true;
         }
         self.rows.clear();
@@ -294,7 +295,7 @@ impl<const R: usize> Scratch<R> {
 
     /// Adds the square of the projection onto the first `fixed` rows and those that were active last: no
     /// step along them is wanted, so that only curvature across them has to be positive.
-    pub(super) fn stiffen(&mut self, size: usize, fixed: usize) {
+    pub(super) fn penalize_rows(&mut self, size: usize, fixed: usize) {
         self.basis.clear();
         let active = self.program.active.iter().copied().filter(|row| *row >= fixed);
         for row in (0..fixed).chain(active) {
@@ -337,7 +338,7 @@ impl<const R: usize> Scratch<R> {
     }
 
     /// Takes the model's step if it lowers the squared residual, which is returned.
-    fn accept<P: Problem<R>>(
+    fn try_step<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
@@ -348,14 +349,15 @@ impl<const R: usize> Scratch<R> {
         let share = if longest > STEP { STEP / longest } else { 1.0 };
         self.trial.clear();
         self.trial.extend(z.iter().zip(&self.program.step).map(|(z, p)| z + share * p));
-        if !region.contains(&self.trial) && !region.restore(&mut self.trial, &mut self.inside) {
+        if !region.contains(&self.trial) && !region.restore(&mut self.trial, &mut self.restoring) {
             return None;
         }
         problem.evaluate(&self.trial, &mut self.trial_residual, &mut self.trial_jacobian);
         if problem.violation() > WITHIN {
             let (mut trial, mut residual) = (std::mem::take(&mut self.trial), self.trial_residual);
             let mut jacobian = std::mem::take(&mut self.trial_jacobian);
-            let inside = self.come_back(problem, region, &mut trial, &mut residual, &mut jacobian);
+            let inside =
+                self.return_inside(problem, region, &mut trial, &mut residual, &mut jacobian);
             (self.trial, self.trial_residual, self.trial_jacobian) = (trial, residual, jacobian);
             if !inside {
                 return None;
@@ -373,7 +375,7 @@ impl<const R: usize> Scratch<R> {
 
     /// Brings a point back inside the problem's own bounds by steps of least length; it is then the one evaluated
     /// last.
-    fn come_back<P: Problem<R>>(
+    fn return_inside<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
@@ -382,7 +384,7 @@ impl<const R: usize> Scratch<R> {
         jacobian: &mut [SVector<f64, R>],
     ) -> bool {
         for _ in 0..RETURNS {
-            if !region.return_by(z, &mut self.inside, |rows| problem.linearize(rows)) {
+            if !region.restoring_step(z, &mut self.restoring, |rows| problem.linearize(rows)) {
                 return false;
             }
             problem.evaluate(z, residual, jacobian);

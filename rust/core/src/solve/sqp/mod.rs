@@ -8,50 +8,12 @@
 //! multiplier estimate it has no Maratos effect, so the fast end phase is never damped.
 
 mod null_space;
+mod problem;
 
 use nalgebra::{SMatrix, SVector};
 
 use null_space::{Frame, Step};
-
-/// Value and first derivatives of a problem at one point.
-#[derive(Clone, Copy, Debug)]
-pub struct Linearization<const N: usize, const M: usize> {
-    /// Objective.
-    pub objective: f64,
-    /// Gradient of the objective in local coordinates.
-    pub gradient: SVector<f64, N>,
-    /// Constraint values, wanted zero.
-    pub constraints: SVector<f64, M>,
-    /// Gradients of the constraints as columns.
-    pub jacobian_transposed: SMatrix<f64, N, M>,
-}
-
-/// An equality-constrained problem on a manifold with `N` local coordinates.
-pub trait Problem<const N: usize, const M: usize> {
-    /// A point of the manifold with whatever is worth keeping between the calls below.
-    type Point: Copy;
-
-    /// Objective, constraints and their gradients, every entry written.
-    fn linearize(&self, point: &Self::Point, out: &mut Linearization<N, M>);
-
-    /// Second derivatives of `f + multipliers . c` along the (second-order) retraction.
-    fn hessian(&self, point: &Self::Point, multipliers: &SVector<f64, M>) -> SMatrix<f64, N, N>;
-
-    /// Puts the point reached by `factor` times a step in local coordinates into `out`.
-    fn retract(
-        &self,
-        point: &Self::Point,
-        step: &SVector<f64, N>,
-        factor: f64,
-        out: &mut Self::Point,
-    );
-
-    /// Whether the point lies on the branch whose minimum is wanted; steps that leave it are cut.
-    fn admissible(&self, point: &Self::Point) -> bool;
-
-    /// Size of a step in the units that the tolerance and the step bound are stated in.
-    fn step_size(&self, step: &SVector<f64, N>) -> f64;
-}
+pub use problem::{Linearization, Problem};
 
 /// How long and how precisely to iterate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +62,7 @@ pub struct Solution<P, const M: usize> {
 impl<P, const M: usize> Solution<P, M> {
     /// An answer that needed no iteration.
     #[must_use]
-    pub fn known(point: P) -> Self {
+    pub fn without_iterations(point: P) -> Self {
         Self {
             point,
             multipliers: SVector::zeros(),
@@ -122,12 +84,12 @@ const ARMIJO: f64 = 1e-4;
 const INITIAL_PENALTY: f64 = 10.0;
 
 /// A point and its derivatives; two of them take turns, so that nothing is copied.
-struct Slot<P, const N: usize, const M: usize> {
+struct Iterate<P, const N: usize, const M: usize> {
     point: P,
     at: Linearization<N, M>,
 }
 
-impl<P: Copy, const N: usize, const M: usize> Slot<P, N, M> {
+impl<P: Copy, const N: usize, const M: usize> Iterate<P, N, M> {
     fn new(point: P) -> Self {
         let at = Linearization {
             objective: 0.0,
@@ -139,7 +101,7 @@ impl<P: Copy, const N: usize, const M: usize> Slot<P, N, M> {
     }
 
     /// Moves here from `from` by a share of a step.
-    fn go<Q: Problem<N, M, Point = P>>(
+    fn move_to<Q: Problem<N, M, Point = P>>(
         &mut self,
         problem: &Q,
         from: &Self,
@@ -183,7 +145,7 @@ fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
     start: P::Point,
     settings: &Settings,
 ) -> Solution<P::Point, M> {
-    let (mut one, mut other) = (Slot::new(start), Slot::new(start));
+    let (mut one, mut other) = (Iterate::new(start), Iterate::new(start));
     // References, so that taking turns moves no data.
     let (mut here, mut there) = (&mut one, &mut other);
     problem.linearize(&here.point, &mut here.at);
@@ -202,11 +164,11 @@ fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
         let size = problem.step_size(&step.full);
         let last = step.exact && size <= settings.step_tolerance;
         let moved = if last {
-            there.go(problem, here, &step.full, 1.0);
+            there.move_to(problem, here, &step.full, 1.0);
             true
         } else {
             let limit = (settings.step_bound / size.max(f64::MIN_POSITIVE)).min(1.0);
-            search(problem, here, there, &step, limit, &mut penalty)
+            line_search(problem, here, there, &step, limit, &mut penalty)
         };
         if !moved {
             break;
@@ -240,7 +202,7 @@ fn restore<const N: usize, const M: usize, P: Problem<N, M>>(
     start: P::Point,
     settings: &Settings,
 ) -> (P::Point, f64) {
-    let (mut one, mut other) = (Slot::new(start), Slot::new(start));
+    let (mut one, mut other) = (Iterate::new(start), Iterate::new(start));
     let (mut here, mut there) = (&mut one, &mut other);
     problem.linearize(&here.point, &mut here.at);
     let mut damping = 1e-3;
@@ -254,7 +216,7 @@ fn restore<const N: usize, const M: usize, P: Problem<N, M>>(
         let Some(inverse) = (gram + shift).try_inverse() else { break };
         let step = columns * (inverse * constraints) * -1.0;
         let size = problem.step_size(&step).max(f64::MIN_POSITIVE);
-        there.go(problem, here, &step, (settings.step_bound / size).min(1.0));
+        there.move_to(problem, here, &step, (settings.step_bound / size).min(1.0));
         if there.at.constraints.norm_squared() < here.at.constraints.norm_squared() {
             std::mem::swap(&mut here, &mut there);
             damping = (0.2 * damping).max(1e-15);
@@ -267,10 +229,10 @@ fn restore<const N: usize, const M: usize, P: Problem<N, M>>(
 
 /// Backtracks along the step until the augmented Lagrangian falls enough; the accepted point is in
 /// `there`.
-fn search<const N: usize, const M: usize, P: Problem<N, M>>(
+fn line_search<const N: usize, const M: usize, P: Problem<N, M>>(
     problem: &P,
-    here: &Slot<P::Point, N, M>,
-    there: &mut Slot<P::Point, N, M>,
+    here: &Iterate<P::Point, N, M>,
+    there: &mut Iterate<P::Point, N, M>,
     step: &Step<N, M>,
     limit: f64,
     penalty: &mut f64,
@@ -292,7 +254,7 @@ fn search<const N: usize, const M: usize, P: Problem<N, M>>(
     let noise = 1e-14 * before.abs() + 1e-300;
     let mut factor = limit;
     for _ in 0..BACKTRACKS {
-        let admissible = there.go(problem, here, &step.full, factor);
+        let admissible = there.move_to(problem, here, &step.full, factor);
         if admissible && merit(&there.at) <= before + ARMIJO * factor * slope + noise {
             return true;
         }

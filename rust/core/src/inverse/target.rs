@@ -1,0 +1,52 @@
+//! Positions and frames that the tool shall reach.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::error::InvalidInput;
+use crate::lie::{Pose, so3};
+
+/// Where the tool should be, in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// Its point \[m\].
+    Position(Vector3<f64>),
+    /// Its point and its axes.
+    Pose(Pose),
+}
+
+impl Target {
+    /// A point.
+    ///
+    /// # Errors
+    /// `InvalidInput` when it is not finite.
+    pub fn point(position: Vector3<f64>) -> Result<Self, InvalidInput> {
+        if let Some(entry) = position.iter().find(|entry| !entry.is_finite()) {
+            return Err(InvalidInput::new("target", "a finite position [m]", entry));
+        }
+        Ok(Self::Position(position))
+    }
+
+    /// A frame, its rotation freed of rounding.
+    #[must_use]
+    pub fn frame(pose: &Pose) -> Self {
+        Self::Pose(Pose { rotation: so3::exp(&so3::log(&pose.rotation)), ..*pose })
+    }
+
+    /// The point \[m\].
+    #[must_use]
+    pub fn position(&self) -> Vector3<f64> {
+        match self {
+            Self::Position(position) => *position,
+            Self::Pose(pose) => pose.translation,
+        }
+    }
+
+    /// The axes, if they matter.
+    #[must_use]
+    pub fn rotation(&self) -> Option<&Matrix3<f64>> {
+        match self {
+            Self::Position(_) => None,
+            Self::Pose(pose) => Some(&pose.rotation),
+        }
+    }
+}
