@@ -11,7 +11,19 @@ use super::arc::Arc;
 use crate::error::{InvalidInput, finite, positive};
 use crate::solve::pseudo_inverse::PseudoInverse;
 
-/// How the length of the segment is found.
+/// Source of the segment's length.
+///
+/// ```
+/// use tdcr::constant_curvature::{Length, Mapping};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mapping = Mapping::new(vec![0.0, 2.1, 4.2], vec![0.008], 0.1)?;
+/// // All tendons are 2 mm longer: the segment is too, if its length is free.
+/// let fit = mapping.fit(&[0.002; 3], Length::Free)?;
+/// assert!((fit.arc.length - 0.102).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Length {
     /// It is known \[m\]: the rest length, or that of an extended backbone.
@@ -21,6 +33,18 @@ pub enum Length {
 }
 
 /// Tendons that end at the tip of one segment, each straight.
+///
+/// ```
+/// use tdcr::constant_curvature::{Arc, Length, Mapping};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mapping = Mapping::new(vec![0.0, 2.1, 4.2], vec![0.008], 0.1)?;
+/// let arc = Arc::new(5.0, 1.0, 0.1);
+/// let fit = mapping.fit(&mapping.displacements(&arc), Length::Known(0.1))?;
+/// assert!((fit.arc.kappa() - 5.0).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Mapping {
     /// Cosine and sine of every azimuth.
@@ -32,6 +56,18 @@ pub struct Mapping {
 }
 
 /// The arc that fits the displacements best, and what it leaves.
+///
+/// ```
+/// use tdcr::constant_curvature::{Length, Mapping};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mapping = Mapping::new(vec![0.0, 2.1, 4.2], vec![0.008], 0.1)?;
+/// // No arc of known length has these displacements.
+/// let fit = mapping.fit(&[0.001; 3], Length::Known(0.1))?;
+/// assert!(fit.residual.iter().any(|off| off.abs() > 1e-4));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The arc.
@@ -189,6 +225,21 @@ impl Mapping {
 }
 
 /// Which tendons of a row count, and the inverse over them, kept for rows with the same ones.
+///
+/// ```
+/// use tdcr::constant_curvature::{Length, Mapping, Pattern};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mapping = Mapping::new(vec![0.0, 2.1, 4.2], vec![0.008], 0.1)?;
+/// // Rows with the same free tendons share one inverse.
+/// let (mut pattern, mut residual) = (Pattern::default(), Vec::new());
+/// for row in [[-0.002, 0.001, 0.001], [0.0, -0.001, 0.001]] {
+///     mapping.fit_row(&row, Length::Known(0.1), &mut pattern, &mut residual)?;
+/// }
+/// assert_eq!(residual.len(), 6);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Pattern {
     active: Vec<usize>,

@@ -12,6 +12,23 @@ use crate::robot::Robot;
 use crate::status::Status;
 
 /// Buffers of a solve.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings, Plan, Scratch};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let mut scratch = Scratch::default();
+/// ConstantCurvature::new(&robot, &plan).solve(&[-0.01, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+/// assert!((scratch.arcs()[0].kappa() - 5.0).abs() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     state: State,
@@ -33,6 +50,24 @@ impl Scratch {
 }
 
 /// The constant-curvature model of a robot, ready to solve.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings, Plan};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let model = ConstantCurvature::new(&robot, &plan);
+/// let shape = model.shape(&[-0.01, f64::INFINITY, f64::INFINITY])?;
+/// // Bent by 1 rad towards +x.
+/// assert!(shape.state.frames[10].translation.x > 0.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct ConstantCurvature<'r> {
     robot: &'r Robot,
@@ -168,7 +203,7 @@ impl<'r> ConstantCurvature<'r> {
     }
 }
 
-/// What displacements do that gives arcs which no robot can take.
+/// Fault of displacements whose arcs no robot can take.
 fn arc_fault(arcs: &[Arc]) -> Option<String> {
     if let Some(i) = arcs.iter().position(|arc| !arc.is_finite()) {
         return Some(format!("make the arc of segment {i} overflow"));

@@ -1,4 +1,4 @@
-//! What the constant-curvature model knows of a robot before any displacement.
+//! Constant-curvature data of a robot, independent of the displacements.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,7 +7,14 @@ use crate::error::InvalidInput;
 use crate::robot::Robot;
 use crate::solve::pseudo_inverse::{PseudoInverse, null_space};
 
-/// How displacements reach the segments.
+/// Coupling between displacements and segments.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvatureSettings, Coupling};
+///
+/// let settings = ConstantCurvatureSettings { coupling: Coupling::PerSegment, extensible: false };
+/// assert_eq!(settings.coupling.as_str(), "per_segment");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Coupling {
     /// Displacements are measured at the base; a tendon is shortened in every segment it runs through.
@@ -32,9 +39,23 @@ impl Coupling {
 }
 
 /// Choices of the constant-curvature model.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let settings = ConstantCurvatureSettings { extensible: true, ..Default::default() };
+/// assert_eq!(Plan::new(&robot, settings)?.width(), 3);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ConstantCurvatureSettings {
-    /// How displacements reach the segments.
+    /// Coupling between displacements and segments.
     pub coupling: Coupling,
     /// The length of every segment is an unknown too; at least three tendons must end at each that has any.
     pub extensible: bool,
@@ -66,7 +87,23 @@ impl Segment {
     }
 }
 
-/// What the model knows of a robot before any displacement.
+/// Constant-curvature data of a robot, independent of the displacements.
+///
+/// ```
+/// use tdcr::constant_curvature::{Arc, ConstantCurvatureSettings, Plan, displacements};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// assert_eq!((plan.segment_count(), plan.width()), (1, 2));
+/// let pulls = displacements(&plan, &[Arc::new(5.0, 0.0, 0.2)]);
+/// assert!((pulls[0] + 0.01 * 5.0 * 0.2).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(super) segments: Vec<Segment>,
@@ -148,7 +185,7 @@ impl Plan {
         unknowns(self.settings.extensible)
     }
 
-    /// How many of the matrix's unknowns a unit of a bending vector \[rad\], or of a length over the
+    /// Unknowns of the matrix per unit of a bending vector \[rad\], or of a length over the
     /// rest length, is \[m\].
     pub(crate) fn unit(&self, unknown: usize) -> f64 {
         let bends = unknown % self.width() < 2;
@@ -179,7 +216,7 @@ impl Plan {
         }
     }
 
-    /// Makes the inverse over the tendons that count, unless it is at hand; columns of the others are
+    /// Computes the inverse over the tendons that count, unless it is cached; columns of the others are
     /// zero.
     pub(super) fn cache_inverse(&self, active: &[bool], masked: &mut Option<MaskedInverse>) {
         let at_hand = masked.as_ref().is_some_and(|(pattern, _)| pattern == active);

@@ -24,7 +24,7 @@ pub(crate) struct UnitArc {
 /// Second derivatives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SecondDerivatives {
-    /// Of the end, by x twice, by x and y, by y twice.
+    /// Second derivatives of the end: by x twice, by x and y, by y twice.
     pub(crate) end: [Vector3<f64>; 3],
     /// `turned[i][j]`: derivative of the i-th angular velocity by the j-th component.
     pub(crate) turned: [[Vector3<f64>; 2]; 2],

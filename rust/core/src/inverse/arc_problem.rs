@@ -1,4 +1,4 @@
-//! A chain of arcs before a target: residuals of the tool, their derivatives, the bending energy.
+//! Chain of arcs and a target: residuals of the tool, their derivatives, the bending energy.
 
 use nalgebra::{Vector2, Vector3, Vector6};
 
@@ -46,7 +46,7 @@ impl<'a> ArcProblem<'a> {
         }
     }
 
-    /// Places every segment.
+    /// Composes the frames of all segments.
     fn set_arcs(&mut self, z: &[f64]) {
         self.arcs.clear();
         self.lengths.clear();
@@ -68,7 +68,7 @@ impl<'a> ArcProblem<'a> {
             .update(frame.transform(&tool.translation), || frame.rotation * tool.rotation);
     }
 
-    /// Derivatives of the tool's place and rotation by every unknown.
+    /// Derivatives of the tool's position and rotation with respect to every unknown.
     fn differentiate(&mut self) {
         self.columns.clear();
         for (i, segment) in self.plan.segments().enumerate() {
@@ -85,7 +85,7 @@ impl<'a> ArcProblem<'a> {
         }
     }
 
-    /// Second derivatives of the tool's place and rotation by two unknowns of one segment.
+    /// Second derivatives of the tool's position and rotation with respect to two unknowns of one segment.
     fn second_derivatives(&self, i: usize) -> [[(Vector3<f64>, Vector3<f64>); 3]; 3] {
         let second = self.arcs[i].second();
         let base = self.frames[i].rotation;

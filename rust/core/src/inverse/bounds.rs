@@ -1,4 +1,4 @@
-//! What an inverse may use, and the region of unknowns it leaves.
+//! Bounds of an inverse, and the region of unknowns inside them.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,6 +10,16 @@ use crate::solve::convex_region::{Disc, Region};
 use crate::solve::pseudo_inverse::null_space;
 
 /// Lowest and highest values, one pair for all or one for each.
+///
+/// ```
+/// use tdcr::inverse::Range;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let range = Range::new("displacement", vec![-0.03], vec![0.01, 0.02, 0.03])?;
+/// assert_eq!(range.at(1), (-0.03, 0.02));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Range {
     lower: Vec<f64>,
@@ -72,11 +82,22 @@ impl Range {
 }
 
 /// Bounds of an inverse. What is `None` has the default.
+///
+/// ```
+/// use tdcr::inverse::{Bounds, Range};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let pretension = Range::new("tension", vec![20.0], vec![2000.0])?;
+/// let bounds = Bounds { tension: Some(pretension), ..Bounds::default() };
+/// assert!(bounds.displacement.is_none());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bounds {
-    /// Of tendon displacements \[m\].
+    /// Range of tendon displacements \[m\].
     pub displacement: Option<Range>,
-    /// Of tensions, where the model has some, in the unit of its results; 0 and more.
+    /// Range of tensions, where the model has some, in the unit of its results; 0 and more.
     pub tension: Option<Range>,
     /// Largest curvature of every segment \[1/m\].
     pub curvature: Option<Range>,
@@ -94,7 +115,7 @@ const STRAIGHT: f64 = 1e-9;
 /// No segment becomes shorter than this share of its rest length.
 const SHORTEST: f64 = 1e-3;
 
-/// Where unknowns may be.
+/// Region of the unknowns, and the box of swarms.
 #[derive(Clone, Debug)]
 pub(super) struct SearchSpace {
     pub(super) region: Region,
@@ -114,11 +135,11 @@ pub(super) struct ArcSpace {
     pub(super) freedoms: usize,
     /// Lowest and highest displacement of every tendon \[m\].
     ranges: Vec<(f64, f64)>,
-    /// What the bounds and the discs of the region hold back.
+    /// Names of the bounds and of the discs of the region, for messages.
     labels: (Vec<String>, Vec<String>),
 }
 
-/// Where a segment's unknowns are drawn from.
+/// Ranges from which a segment's unknowns are drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SegmentRange {
     /// Largest angle \[rad\].
@@ -152,7 +173,7 @@ impl ArcSpace {
             ranges,
             labels: (Vec::new(), Vec::new()),
         };
-        space.add_equation(plan);
+        space.add_equations(plan);
         for i in 0..plan.segment_count() {
             space.bound_length(plan, bounds, i);
             space.bound_turn(plan, bounds, i);
@@ -161,8 +182,8 @@ impl ArcSpace {
         Ok(space)
     }
 
-    /// What is no freedom: directions that no tendon moves, straight segments, values held by equal bounds.
-    fn add_equation(&mut self, plan: &Plan) {
+    /// Adds an equation for every direction that is no freedom: moved by no tendon, straight, or with equal bounds.
+    fn add_equations(&mut self, plan: &Plan) {
         let (width, size) = (plan.width(), self.search.region.size());
         let mut equations: Vec<(Vec<f64>, f64)> = Vec::new();
         for direction in plan.unactuated_directions() {
@@ -239,7 +260,7 @@ impl ArcSpace {
         }
     }
 
-    /// The bounds that hold a point back.
+    /// Names of the bounds that are active at a point.
     pub(super) fn active_bounds(&self, point: &[f64]) -> Vec<&str> {
         let (bounds, discs) = self.search.region.active_at(point, 1e-9);
         let bounds = bounds.into_iter().map(|k| self.labels.0[k].as_str());

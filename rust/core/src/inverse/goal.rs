@@ -4,12 +4,12 @@ use nalgebra::SVector;
 
 use crate::rod::equilibrium::Motion;
 
-/// What is wanted of a rod: residuals at a balance, and their derivatives by the tensions.
+/// Goal of a rod's inverse: residuals at an equilibrium, and their derivatives with respect to the tensions.
 pub(super) trait Goal<const R: usize> {
-    /// Looks at where the rod is.
+    /// Reads the rod's position at an equilibrium.
     fn update(&mut self, motion: &Motion);
 
-    /// Residuals of the last placing and their derivatives.
+    /// Residuals of the last update and their derivatives.
     fn write_residual(
         &mut self,
         motion: &Motion,
@@ -17,10 +17,10 @@ pub(super) trait Goal<const R: usize> {
         jacobian: &mut [SVector<f64, R>],
     );
 
-    /// The squared residuals of the last placing.
+    /// Squared residuals of the last update.
     fn squared_norm(&self) -> f64;
 
-    /// Whether residuals, not those of the last placing in every case, are as small as wanted.
+    /// True when residuals, which need not be those of the last update, are within the tolerances.
     fn is_met(&self, residual: &SVector<f64, R>) -> bool;
 
     /// Adds the second derivatives of `weights . r` by the tensions to the lower triangle of a matrix.

@@ -1,7 +1,7 @@
 //! From where the tool should be to tendon displacements.
 //!
 //! [`ConstantCurvatureInverse`] finds the arcs by descents from many starts ([`crate::solve::levenberg_marquardt`]),
-//! inside bounds, and spends what freedom is left on the least bending energy; [`RodInverse`] finds tensions
+//! inside bounds, and spends the remaining freedom on the least bending energy; [`RodInverse`] finds tensions
 //! likewise, none below zero, and spends it on the least of them.
 
 mod arc_problem;

@@ -15,7 +15,7 @@ const CANDIDATES: usize = 4;
 const POLISH: usize = 300;
 /// Steps that lower the energy.
 const LOWER: usize = 500;
-/// The same where derivatives jump.
+/// Steps that lower the energy where derivatives jump.
 const LOWER_KINKS: usize = 30;
 
 /// Buffers of a search, and the point it found.
@@ -27,11 +27,11 @@ pub(super) struct Multistart<'a, const R: usize = 6> {
     /// Ends the search before its next start when it is set.
     pub(super) stop: Option<&'a AtomicBool>,
     pub(super) swarm: Option<Swarm>,
-    /// Where descents ended that did not meet the target, by their squared residual, best first.
+    /// Ends of descents that did not meet the target, with their squared residuals, best first.
     pub(super) candidates: Vec<(f64, Vec<f64>)>,
 }
 
-/// How a search ended.
+/// Outcome of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SearchOutcome {
     pub(super) status: Status,
@@ -42,28 +42,28 @@ pub(super) struct SearchOutcome {
 /// Freedom that is spent on the energy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Freedom {
-    /// None is left, or it is not to be spent.
+    /// No freedom, or none to be spent.
     None,
     Smooth,
     /// Derivatives jump: the energy is least where no step leads lower.
     Kinked,
 }
 
-/// What to search for.
+/// Options of one search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SearchOptions<'s> {
     /// The first start, and how many.
     pub(super) first: usize,
     pub(super) starts: usize,
     pub(super) max_iterations: usize,
-    /// What the target leaves, to spend on the energy.
+    /// Freedom that the target leaves, to spend on the energy.
     pub(super) freedom: Freedom,
     pub(super) method: Method,
     /// No start beyond these is from a swarm.
     pub(super) swarms: usize,
     /// A swarm is the last resort.
     pub(super) fall_back: bool,
-    /// The nearest point is wanted where none meets the target.
+    /// True for the nearest point where none meets the target.
     pub(super) nearest: bool,
     pub(super) swarm: &'s PsoSettings,
 }
@@ -85,7 +85,7 @@ impl<const R: usize> Multistart<'_, R> {
         SearchOutcome { status, iterations: self.solver.iterations, starts }
     }
 
-    /// How the search ended, and after how many starts.
+    /// Status of the search and the number of starts tried.
     fn try_starts<P: Problem<R>>(
         &mut self,
         problem: &mut P,
@@ -100,6 +100,7 @@ impl<const R: usize> Multistart<'_, R> {
             if tried > 0 && self.is_stopped() {
                 return (Status::IterationLimit, tried);
             }
+            // Start k, brought into the region: from the caller, or from a swarm.
             let k = options.first + tried;
             if tried > 0 {
                 problem.restart();
@@ -117,12 +118,13 @@ impl<const R: usize> Multistart<'_, R> {
                 }
                 continue;
             }
+            // A descent that meets the target ends the search.
             descended = true;
             if let Some(status) = self.descend(problem, space, options) {
                 return (status, tried + 1);
             }
         }
-        // A swarm looks where the starts did not, unless none of them had a value at all.
+        // A swarm searches where the starts did not, unless none of them had a value at all.
         if options.fall_back && !(descended && self.candidates.is_empty()) {
             problem.restart();
             if self.swarm_start(problem, space, options.swarm, 0)
@@ -131,20 +133,21 @@ impl<const R: usize> Multistart<'_, R> {
                 return (status, options.starts);
             }
         }
+        // Out of reach: the nearest point, from the best ends.
         if !options.nearest {
             return (Status::Unreachable, options.starts);
         }
         (self.nearest(problem, space, options), options.starts)
     }
 
-    /// Whether the region has a point, which is then at hand.
+    /// True when the region has a point, which is then the current one.
     fn find_inner_point(&mut self, space: &SearchSpace) -> bool {
         self.point.clear();
         self.point.extend(space.lower.iter().zip(&space.upper).map(|(l, u)| 0.5 * (l + u)));
         self.solver.restore(&space.region, &mut self.point)
     }
 
-    /// Descends from the point at hand: the status if it meets the target.
+    /// Descends from the current point: the status if it meets the target.
     fn descend<P: Problem<R>>(
         &mut self,
         problem: &mut P,
@@ -160,7 +163,7 @@ impl<const R: usize> Multistart<'_, R> {
         None
     }
 
-    /// Whether it was told to end.
+    /// True when the stop flag is set.
     pub(super) fn is_stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
@@ -224,7 +227,7 @@ impl<const R: usize> Multistart<'_, R> {
             }
         }
         let Some((_, status, point)) = best else { return Status::NumericalError };
-        // Only to what this search kept: another one's balance would depend on the rows before.
+        // Restored only from this search: another one's equilibrium would depend on the rows before.
         problem.restore_state();
         self.point = point;
         status

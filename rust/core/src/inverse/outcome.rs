@@ -1,4 +1,4 @@
-//! How an inverse ended, and in words.
+//! Outcome of an inverse, and its message.
 
 use std::borrow::Borrow;
 
@@ -6,7 +6,29 @@ use super::InverseSettings;
 use super::multistart::SearchOutcome;
 use crate::status::Status;
 
-/// How an inverse ended; what it found is in the workspace.
+/// Outcome of an inverse; the unknowns are in its buffers.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
+/// # use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// # let (bounds, settings) = (Bounds::default(), InverseSettings::default());
+/// # let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
+/// let mut scratch = inverse.scratch();
+/// // Twice as far as the robot is long.
+/// let answer = inverse.solve(&Target::Position(Vector3::new(0.0, 0.0, 0.4)), None, &mut scratch);
+/// assert_eq!(answer.status, tdcr::Status::Unreachable);
+/// assert!((answer.distance - 0.2).abs() < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Converged: the target is met, with the least bending energy nearby where there is freedom.
@@ -29,12 +51,12 @@ impl Answer {
         Self { status, distance, angle, iterations, starts }
     }
 
-    /// Of a robot of which no shape was found.
+    /// Answer for a robot of which no shape was found.
     pub(super) fn without_shape(found: SearchOutcome) -> Self {
         Self::of(SearchOutcome { status: Status::Infeasible, ..found }, (f64::NAN, f64::NAN))
     }
 
-    /// Of a target that was not sought.
+    /// Answer for a target that was not tried.
     pub(super) fn none() -> Self {
         Self {
             status: Status::NumericalError,
@@ -46,7 +68,7 @@ impl Answer {
     }
 }
 
-/// What stood in the way, in a sentence: the bounds that hold back, and what freedom is spent on.
+/// Reason why a solve did not converge, in a sentence: the active bounds, and the freedom not yet spent.
 pub(super) fn message_of<S: Borrow<str>>(
     answer: &Answer,
     settings: &InverseSettings,

@@ -1,4 +1,4 @@
-//! The tool at a target, as what is wanted of a rod.
+//! Tool at a target, as the goal of a rod's inverse.
 
 use nalgebra::Vector6;
 
@@ -6,7 +6,7 @@ use super::goal::Goal;
 use super::pose_residual::PoseResidual;
 use crate::rod::equilibrium::Motion;
 
-/// A target of the tool.
+/// Target pose of the tool.
 #[derive(Clone, Debug)]
 pub(super) struct PoseGoal<'a> {
     pub(super) pose_residual: PoseResidual<'a>,

@@ -1,4 +1,4 @@
-//! The tool before a target: weighted residuals and their derivatives.
+//! Weighted residuals of the tool with respect to a target, and their derivatives.
 
 use nalgebra::{Matrix3, RowVector3, Vector3, Vector6};
 
@@ -6,13 +6,13 @@ use super::{InverseSettings, Target};
 use crate::lie::{Pose, so3};
 use crate::robot::Robot;
 
-/// How much of the robot's length one radian counts, unless it is said; and all of the tool.
+/// Default weight of one radian, as a share of the robot's length; the tool's reach is added to it.
 const RADIAN: f64 = 0.3;
 
 /// Velocity of the tool and angular velocity.
 pub(super) type Twist = (Vector3<f64>, Vector3<f64>);
 
-/// A target, and how far the tool is from it.
+/// Weighted residual of the tool's pose with respect to a target, in the frame of the base.
 #[derive(Clone, Debug)]
 pub(super) struct PoseResidual<'a> {
     robot: &'a Robot,
@@ -23,7 +23,7 @@ pub(super) struct PoseResidual<'a> {
     /// Weights of the residuals over the robot's reach: position along world axes, rotation about tool
     /// axes.
     weights: Vector6<f64>,
-    /// Place of the tool.
+    /// Position of the tool.
     pub(super) tool: Vector3<f64>,
     /// Rotation of the tool.
     rotation: Matrix3<f64>,
@@ -53,7 +53,7 @@ impl<'a> PoseResidual<'a> {
         }
     }
 
-    /// Everything is in the frame of the base: the world's origin may be far away.
+    /// Sets a target of the world. Residuals are in the frame of the base: the world's origin may be far away.
     pub(super) fn set_target(&mut self, target: Target) {
         let world = self.robot.base().inverse();
         self.target = match target {
@@ -74,14 +74,14 @@ impl<'a> PoseResidual<'a> {
         self.target
     }
 
-    /// How far a target is from a place of the tool, over the robot's length, and its angle \[rad\].
+    /// Distance from a pose of the tool to a target, over the robot's length, plus the angle \[rad\].
     pub(super) fn relative_distance(&self, from: &Pose, to: &Target) -> f64 {
         let turn = |rotation| so3::log(&from.rotation.tr_mul(rotation)).norm();
         let off = (to.position() - from.translation).norm();
         off / self.robot.backbone().total_length() + to.rotation().map_or(0.0, turn)
     }
 
-    /// Aims at a share of the way from a place of the tool to a target, both in the base's frame.
+    /// Sets the target at a share of the way from a pose of the tool to another target, both in the base's frame.
     pub(super) fn interpolate_target(&mut self, from: &Pose, to: &Target, share: f64) {
         if share >= 1.0 {
             self.target = *to;
@@ -93,7 +93,7 @@ impl<'a> PoseResidual<'a> {
         };
     }
 
-    /// Whether the target has axes.
+    /// True when the target has axes.
     pub(super) fn rotates(&self) -> bool {
         self.target.rotation().is_some()
     }
@@ -103,13 +103,13 @@ impl<'a> PoseResidual<'a> {
         self.axes.map_or(*v, |axes| axes * v)
     }
 
-    /// Number of residuals that count.
+    /// Number of residuals with a weight.
     pub(super) fn row_count(&self) -> usize {
         let given = if self.rotates() { 6 } else { 3 };
         self.weights.iter().take(given).filter(|weight| **weight > 0.0).count()
     }
 
-    /// Distance \[m\] and angle \[rad\] by which the tool misses the target where it was placed last, over
+    /// Distance \[m\] and angle \[rad\] from the tool of the last update to the target, over
     /// the axes that count; 0 for the angle to a position.
     pub(super) fn errors(&self) -> (f64, f64) {
         let counts = |weight: f64, value: f64| if weight > 0.0 { value * value } else { 0.0 };
@@ -120,7 +120,7 @@ impl<'a> PoseResidual<'a> {
         (sum(0, &off), if self.rotates() { sum(3, &self.error) } else { 0.0 })
     }
 
-    /// Places the tool, given in the base's frame.
+    /// Updates the pose of the tool, given in the base's frame.
     pub(super) fn update(&mut self, point: Vector3<f64>, rotation: impl FnOnce() -> Matrix3<f64>) {
         self.tool = point;
         if let Some(wanted) = self.target.rotation() {
@@ -130,14 +130,14 @@ impl<'a> PoseResidual<'a> {
         }
     }
 
-    /// Residuals of the last placing.
+    /// Residuals of the last update.
     pub(super) fn residual(&self) -> Vector6<f64> {
         let off = self.in_weight_axes(&(self.target.position() - self.tool));
         let turn = if self.rotates() { self.error } else { Vector3::zeros() };
         Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z).component_mul(&self.weights)
     }
 
-    /// Their derivatives by what moves the tool so.
+    /// Derivatives of the residuals with respect to unknowns that move the tool with these twists.
     pub(super) fn write_jacobian<'t>(
         &self,
         twists: impl IntoIterator<Item = &'t Twist>,
@@ -154,7 +154,7 @@ impl<'a> PoseResidual<'a> {
         }
     }
 
-    /// Whether residuals, not those of the last placing in every case, are within the tolerances.
+    /// True when residuals, which need not be those of the last update, are within the tolerances.
     pub(super) fn is_met(&self, residual: &Vector6<f64>) -> bool {
         let sum = |rows: std::ops::Range<usize>| {
             let counted = rows.filter(|k| self.weights[*k] > 0.0);
@@ -176,26 +176,26 @@ impl<'a> PoseResidual<'a> {
     }
 }
 
-/// What weights of the residuals push the tool by.
+/// Force and moment on the tool that weights of the residuals amount to.
 pub(super) struct Curvature<'t, 'a> {
     residual: &'t PoseResidual<'a>,
     /// Along the base's axes.
     pub(super) force: Vector3<f64>,
-    /// The same, as `error_rate` carries it.
+    /// Moment along the base's axes.
     pub(super) moment: Vector3<f64>,
     /// About the tool's axes.
     twist: Vector3<f64>,
 }
 
 impl Curvature<'_, '_> {
-    /// What is needed of one unknown's spin for [`Self::rotation`].
+    /// Row of one unknown's angular velocity for [`Self::rotation`].
     pub(super) fn row(&self, spin: &Vector3<f64>) -> RowVector3<f64> {
         let turned = self.residual.rotation.transpose() * spin;
         self.twist.transpose()
             * so3::left_jacobian_inverse_derivative(&self.residual.error, &turned)
     }
 
-    /// The part of the rotation, of two unknowns by their spins, the row of the first, and the moment's work on the
+    /// Rotational part for two unknowns by their spins, the row of the first, and the moment's work on the
     /// change of the first one's spin by the other.
     pub(super) fn rotation(
         &self,

@@ -1,4 +1,4 @@
-//! The disks at wanted places, as what is wanted of a rod.
+//! Disks at given positions, as the goal of a rod's inverse.
 //!
 //! Of the residuals of many disks only their sum of squares and its derivatives count: with `[J r] = Q U`, those of
 //! the triangular U, one row more than there are tendons.
@@ -8,16 +8,16 @@ use nalgebra::{DMatrix, SVector, Vector3};
 use super::goal::Goal;
 use crate::rod::equilibrium::Motion;
 
-/// Wanted places of disks.
+/// Target positions of some of the disks.
 #[derive(Clone, Debug)]
 pub(super) struct PositionGoal {
-    /// Disk, from 0 for the first beyond the base, and its place in the base's frame \[m\].
+    /// Disk, from 0 for the first beyond the base, and its target position in the base's frame \[m\].
     targets: Vec<(usize, Vector3<f64>)>,
     /// Residual of a metre.
     scale: f64,
     /// Residuals whose squares sum up to its square are met.
     tolerance: f64,
-    /// From the disks to their places where the rod was looked at last \[m\].
+    /// Offsets from the disks to their targets at the last update \[m\].
     offsets: Vec<Vector3<f64>>,
     velocities: Vec<Vector3<f64>>,
     forces: Vec<Vector3<f64>>,
@@ -25,7 +25,7 @@ pub(super) struct PositionGoal {
 }
 
 impl PositionGoal {
-    /// Of a rod of a length, met when every disk is within a tolerance \[m\].
+    /// Goal of a rod of a length, met when every disk is within a tolerance \[m\].
     pub(super) fn new(targets: Vec<(usize, Vector3<f64>)>, length: f64, tolerance: f64) -> Self {
         let scale = 1.0 / (length * (targets.len().max(1) as f64).sqrt());
         Self {
@@ -94,7 +94,7 @@ impl<const R: usize> Goal<R> for PositionGoal {
         residual.norm() <= self.tolerance
     }
 
-    /// Only for the residuals of the last placing as weights, which is what a sum of squares asks for.
+    /// Second derivatives with the residuals of the last update as weights, as a sum of squares needs them.
     fn add_hessian(&mut self, motion: &mut Motion, _: &SVector<f64, R>, matrix: &mut [f64]) {
         let count = motion.columns.len();
         self.forces.clear();

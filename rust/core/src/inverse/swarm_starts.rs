@@ -1,4 +1,4 @@
-//! A particle swarm over the unknowns: starts for descents from wherever it settles.
+//! Particle swarms over the unknowns: starts of descents from their best points.
 
 use std::convert::Infallible;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,7 +31,7 @@ impl<F: FnMut(&[f64]) -> f64> Objective for Cost<'_, F> {
         for (value, place) in values.iter_mut().zip(points.chunks_exact(size)) {
             self.point.clear();
             self.point.extend_from_slice(place);
-            // A value that is left out is none.
+            // A value that is not written counts as none.
             if self.region.restore(&mut self.point, &mut self.inside) {
                 let way = self.point.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
                 *value = (self.squared)(&self.point) + way;
@@ -46,7 +46,7 @@ impl<F: FnMut(&[f64]) -> f64> Objective for Cost<'_, F> {
 }
 
 impl<const R: usize> Multistart<'_, R> {
-    /// Puts the place where a swarm settles into `point`, inside the region; false when it found none.
+    /// Runs a swarm and puts its best point, brought into the region, into `point`; false when it found none.
     pub(super) fn swarm_start<P: Problem<R>>(
         &mut self,
         problem: &mut P,

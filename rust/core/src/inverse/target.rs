@@ -5,7 +5,19 @@ use nalgebra::{Matrix3, Vector3};
 use crate::error::InvalidInput;
 use crate::lie::{Pose, so3};
 
-/// Where the tool should be, in the world.
+/// Target of the tool, in the world.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::inverse::Target;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let target = Target::point(Vector3::new(0.05, 0.03, 0.17))?;
+/// assert!(target.rotation().is_none());
+/// assert!(Target::point(Vector3::new(f64::NAN, 0.0, 0.0)).is_err());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
     /// Its point \[m\].

@@ -1,4 +1,4 @@
-//! The rod before what is wanted of it: residuals by the tensions, bounds on displacements, the sum of squared
+//! Goal of a rod as a least-squares problem in the tensions: residuals, bounds on displacements, the sum of squared
 //! tensions.
 
 use nalgebra::SVector;
@@ -25,19 +25,19 @@ pub(super) struct TensionProblem<'a, G = PoseGoal<'a>> {
     /// Length of every tendon at rest, which violations are measured by \[m\].
     rest_lengths: &'a [f64],
     has_bounds: bool,
-    /// What tendons without tension are let out by, so that rounding does not lock those that depend on each other \[m\].
+    /// Length by which slack tendons are let out, so that rounding does not lock those that depend on each other \[m\].
     pub(super) slack_allowance: f64,
     tensions: Vec<f64>,
-    /// The point evaluated last is a balance.
+    /// The point evaluated last is an equilibrium.
     balanced: bool,
     second: Vec<f64>,
 }
 
 /// Second derivatives that are nearly right lead to a gradient of this precision in few steps.
 const PRECISION: f64 = 1e-6;
-/// Place of the balance nearest to what is wanted, among those that are kept.
+/// Slot of the equilibrium nearest to the goal, among those that are kept.
 const NEAREST: usize = 2;
-/// A tendon pulls no more than this: it has no tension \[rad\].
+/// Largest unknown of a slack tendon \[rad\].
 const SLACK: f64 = 1e-9;
 
 impl<'a, G> TensionProblem<'a, G> {
@@ -63,7 +63,7 @@ impl<'a, G> TensionProblem<'a, G> {
         }
     }
 
-    /// Goes to the balance under the tensions of a point and looks at it.
+    /// Moves the rod to the equilibrium under the tensions of a point and updates the goal; false when there is none.
     fn move_to<const R: usize>(&mut self, z: &[f64]) -> bool
     where
         G: Goal<R>,
@@ -85,10 +85,10 @@ impl<'a, G> TensionProblem<'a, G> {
         self.balanced
     }
 
-    /// Displacements at hand \[m\]; rounding leaves none outside its bounds.
+    /// Displacements at the equilibrium \[m\]; rounding leaves none outside its bounds.
     pub(super) fn write_displacements(&self, place: &mut [f64]) {
         for (k, (displacement, (lower, upper))) in place.iter_mut().zip(self.ranges).enumerate() {
-            // Where an obstacle's function failed before the first balance there are none.
+            // There are none where an obstacle's function failed before the first equilibrium.
             let own = self.rod.tensions().get(k);
             let slack = own.is_some_and(|tension| *tension <= SLACK * self.units[k]);
             let slack_allowance = if slack { self.slack_allowance } else { 0.0 };
@@ -96,17 +96,17 @@ impl<'a, G> TensionProblem<'a, G> {
         }
     }
 
-    /// Whether the point evaluated last is a balance.
+    /// True when the point evaluated last is an equilibrium.
     pub(super) fn balanced(&self) -> bool {
         self.balanced
     }
 
-    /// Forgets the point evaluated last: the rod is put elsewhere.
+    /// Invalidates the point evaluated last: the rod is moved elsewhere.
     pub(super) fn forget(&mut self) {
         self.balanced = false;
     }
 
-    /// Bounds on displacements that hold the point evaluated last back: a tendon, and whether its release is.
+    /// Bounds on displacements that are active at the point evaluated last: a tendon, and true for its release.
     pub(super) fn active_bounds(&self, within: f64) -> Vec<(usize, bool)> {
         let mut out = Vec::new();
         for (k, (lower, upper)) in self.ranges.iter().enumerate() {
@@ -130,7 +130,7 @@ impl<const R: usize, G: Goal<R>> Problem<R> for TensionProblem<'_, G> {
         jacobian: &mut [SVector<f64, R>],
     ) {
         if !self.move_to::<R>(z) {
-            // No balance there: a step is not taken.
+            // Without an equilibrium the step is refused.
             residual.fill(f64::NAN);
             return;
         }
@@ -316,8 +316,8 @@ mod tests {
         }
     }
 
-    /// The same where it leans on a ball, under weight and a force and moment at the tip. What
-    /// leaning bends is left out of the second derivatives: they are not looked at.
+    /// Derivatives where the rod leans on a ball, under weight and a force and moment at the tip. What
+    /// contact bends is not in the second derivatives: they are not compared.
     #[test]
     fn derivatives_agree_with_differences_in_contact() {
         let settings = InverseSettings::default();
@@ -351,7 +351,7 @@ mod tests {
         }
     }
 
-    /// Of the sum of squares over wanted places of some of the disks: its slope and, but for how tensions change the
+    /// Sum of squares over target positions of some of the disks: its slope and, but for how tensions change the
     /// stiffness, its second derivatives.
     #[test]
     fn derivatives_of_places_agree_with_differences() {

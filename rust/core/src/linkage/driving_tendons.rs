@@ -16,7 +16,7 @@ pub(super) enum DrivingTendons {
 }
 
 impl DrivingTendons {
-    /// Whether a tendon is part of the linkage.
+    /// True when a tendon is part of the linkage.
     pub(super) fn contains(self, tendon: usize) -> bool {
         match self {
             Self::None => false,
@@ -31,11 +31,11 @@ impl DrivingTendons {
 pub(super) struct Run {
     pub(super) first: usize,
     pub(super) last: usize,
-    /// How each pair of tendons stands, tendon by tendon.
+    /// Relative azimuth of each pair of tendons, tendon by tendon.
     pairs: Vec<RelativeAzimuth>,
 }
 
-/// How the holes of two tendons stand to each other on the disks of a run.
+/// Relative azimuth of the holes of two tendons on the disks of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum RelativeAzimuth {
     /// On different lines through the centre on every disk: they can form a seven-bar.
@@ -97,13 +97,13 @@ fn relative_azimuths(robot: &Robot, first: usize, last: usize) -> Vec<RelativeAz
 /// By how much a bend breaks a tendon's bound; negative where it leaves slack.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Overstretch {
-    /// As a share of the tendon's length in the run.
+    /// Overstretch as a share of the tendon's length in the run.
     pub(super) share: f64,
-    /// As the bend across the plane of the pulled tendon that would take it up.
+    /// Bend across the plane of the pulled tendon that would take it up.
     sideways: f64,
 }
 
-/// What the choice looks at.
+/// Choice of the driving tendons at given displacements.
 pub(super) struct TendonChoice<'a> {
     pub(super) robot: &'a Robot,
     /// Pieces of every tendon, scaled to unit subsegments.
@@ -152,7 +152,7 @@ impl TendonChoice<'_> {
             .reduce(|best, k| if pull(k) > pull(best) { k } else { best })
     }
 
-    /// What the bend of tendon `pulled` alone asks of tendon `k` beyond its bound, to first order. Free
+    /// Overstretch of tendon `k` beyond its bound by the bend of tendon `pulled` alone, to first order. Free
     /// tendons have no bound.
     pub(super) fn overstretch(&self, run: &Run, pulled: usize, k: usize) -> Overstretch {
         let path = &self.robot.paths()[k];

@@ -1,4 +1,4 @@
-//! What stood in the way of a solve, in words.
+//! Messages about a solve of the linkage model.
 
 use super::driving_tendons::{BOUND_TOLERANCE, DrivingTendons, Run};
 use super::model::{Failure, Linkage, Scratch};
@@ -7,7 +7,7 @@ use super::subsegment::{BEND_MARGIN, Infeasibility};
 use crate::solve::sqp::Ending;
 
 impl Linkage<'_> {
-    /// What stood in the way of the last solve in `work`; empty when it converged.
+    /// Reason why the last solve in `work` did not converge; empty when it did.
     pub(super) fn describe(&self, displacements: &[f64], work: &Scratch) -> String {
         match work.failure {
             None => self.push_message(displacements, work),
@@ -78,7 +78,7 @@ impl Linkage<'_> {
         )
     }
 
-    /// What a converged answer should still say: the linkage keeps both lengths, as in the paper, also
+    /// Remark on a converged answer: the linkage keeps both lengths, as in the paper, also
     /// where the second tendon would have to push.
     fn push_message(&self, displacements: &[f64], work: &Scratch) -> String {
         let choice = self.choice(displacements);

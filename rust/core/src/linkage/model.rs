@@ -13,7 +13,23 @@ use crate::robot::{Path, Robot};
 use crate::solve::sqp::{Ending, Settings};
 use crate::status::Status;
 
-/// What the linkage model knows of a robot before any displacement: worth keeping between solves.
+/// Linkage data of a robot, independent of the displacements: worth keeping between solves.
+///
+/// ```
+/// use tdcr::linkage::{Linkage, LinkageSettings, Plan};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// // One plan serves any settings and any number of solves.
+/// let plan = Plan::new(&robot)?;
+/// let linkage = Linkage::new(&robot, &plan, LinkageSettings::default())?;
+/// # let _ = linkage;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(super) runs: Vec<Run>,
@@ -42,6 +58,23 @@ impl Plan {
 }
 
 /// The linkage model of a robot, ready to solve.
+///
+/// ```
+/// use tdcr::linkage::{Linkage, LinkageSettings, Plan};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot)?;
+/// let linkage = Linkage::new(&robot, &plan, LinkageSettings::default())?;
+/// let shape = linkage.shape(&[-0.01, f64::INFINITY, f64::INFINITY])?;
+/// assert_eq!(shape.report.status, tdcr::Status::Converged);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Linkage<'r> {
     pub(super) robot: &'r Robot,
@@ -50,6 +83,27 @@ pub struct Linkage<'r> {
 }
 
 /// Buffers of a solve, reused from one to the next.
+///
+/// ```
+/// use tdcr::linkage::{Linkage, LinkageSettings, Plan, Scratch};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot)?;
+/// let linkage = Linkage::new(&robot, &plan, LinkageSettings::default())?;
+/// // The same buffers for many solves.
+/// let mut scratch = Scratch::default();
+/// for pull in [0.001, 0.002, 0.003] {
+///     linkage.solve(&[-pull, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+///     assert!((linkage.state(&scratch).tendon_lengths[0] - 0.2 + pull).abs() < 1e-9);
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     pub(super) state: State,
@@ -57,7 +111,7 @@ pub struct Scratch {
     pub(super) failure: Option<Failure>,
 }
 
-/// What failed first.
+/// First failure of a solve.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Failure {
     /// Upper disk of the subsegment, its run and what is in the way.

@@ -3,6 +3,15 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// A pose of the upper disk: link direction and disk rotation, with what both derivatives need.
+///
+/// ```
+/// use tdcr::linkage::Pose;
+///
+/// let pose = Pose::from_bend(0.4, 0.0);
+/// // The link points at half the bend.
+/// assert!((pose.link.x.atan2(pose.link.z) - 0.2).abs() < 1e-15);
+/// assert!((pose.rotation_vector().y - 0.4).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
     /// Unit vector from the lower to the upper disk centre, in the lower disk's frame.
@@ -38,7 +47,7 @@ impl Pose {
         Self::from_bend_towards(angle, cos, sin)
     }
 
-    /// The same, towards the unit vector `(cos, sin)`.
+    /// Pose bent towards the unit vector `(cos, sin)`.
     #[must_use]
     pub(super) fn from_bend_towards(angle: f64, cos: f64, sin: f64) -> Self {
         let (half_sin, half_cos) = (0.5 * angle).sin_cos();

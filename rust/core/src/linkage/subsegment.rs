@@ -7,7 +7,7 @@ use super::pose::Pose;
 use super::seven_bar::{Hole, Point, SevenBar, linear_bend};
 use crate::solve::sqp::{self, Ending, Problem, Settings, Solution};
 
-/// What is asked of a subsegment; equal questions have equal answers.
+/// Linkage of one subsegment and its pulls; equal problems have equal poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum SubsegmentProblem {
     /// No tendon pulls: straight, by definition.
@@ -39,7 +39,7 @@ pub(super) const BEND_MARGIN: f64 = 1e-12;
 pub(super) enum Infeasibility {
     /// Half the norm of `(c, s)`, which is the sine of half the bend, reaches 1.
     Bend,
-    /// A hole (0 or 1) whose tendon piece would have no length left.
+    /// A hole (0 or 1) whose tendon piece would have no length.
     Piece(usize),
 }
 
@@ -96,7 +96,7 @@ impl SubsegmentProblem {
         }
     }
 
-    /// The pose to go on with where there is no answer: bent as far as the start goes.
+    /// Pose with which the chain continues where there is no answer: that of the start.
     pub(super) fn fallback_pose(&self) -> SubsegmentPose {
         let pose = match self {
             Self::Straight => Pose::straight(),
@@ -156,7 +156,7 @@ pub fn solve_four_bar(hole: &Hole, settings: &Settings) -> Solution<super::four_
 }
 
 /// The seven-bar linkage with tendons in its first `M` holes, from `start` or its own. A start that
-/// leads nowhere (the mirror branch, say) falls back to its own.
+/// does not converge (on the mirror branch, say) falls back to its own.
 #[must_use]
 pub fn solve_seven_bar<const M: usize>(
     holes: &[Hole; 2],
@@ -183,7 +183,7 @@ pub fn solve_seven_bar<const M: usize>(
         let pose = from.map_or_else(|| problem.start(), |point: Point| point.pose);
         (problem, problem.point(pose))
     });
-    // Out of reach from one start is not out of reach: others before it is said.
+    // Out of reach from one start is not out of reach: other starts follow.
     for (bend, towards) in OTHER_STARTS {
         if found.ending == Ending::Converged {
             break;
@@ -216,7 +216,7 @@ const OTHER_STARTS: [(f64, f64); 12] = [
 /// Steps of the fallback along the pull.
 const STEPS: usize = 8;
 
-/// Where one solve from the start failed: along the pull in equal steps, each from the last answer.
+/// Continuation along the pull in equal steps, each from the last answer, after one solve from the start failed.
 fn continuation_in_pull<const N: usize, const M: usize, P: Problem<N, M>>(
     found: Solution<P::Point, M>,
     settings: &Settings,

@@ -1,4 +1,4 @@
-//! Many targets, on all cores.
+//! Batches of targets, on all cores.
 
 use std::sync::atomic::Ordering;
 
@@ -12,6 +12,20 @@ use crate::batch::Control;
 use crate::error::InvalidInput;
 
 /// Solutions of many targets in one flat table.
+///
+/// ```
+/// use tdcr::batch::{Control, pool};
+/// use tdcr::planar::{TwoSections, solution_rows};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let two = TwoSections::new(0.14, 0.12, std::f64::consts::TAU)?;
+/// let targets = [[0.2, 0.06], [1.0, 0.0]];
+/// let rows = solution_rows(&two, &targets, &pool(Some(1))?, &Control::default()).unwrap_or_default();
+/// // The second target is out of reach.
+/// assert_eq!((rows.counts[0], rows.counts[1]), (rows.turns.len(), 0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SolutionRows {
     /// Turns of all solutions, target by target, each by bending energy \[rad\].

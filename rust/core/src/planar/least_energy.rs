@@ -32,15 +32,17 @@ pub(super) fn descend(
         if stop.load(Ordering::Relaxed) {
             return (false, steps);
         }
+        // Multipliers of the target, free turns, gradient of the energy along the target.
         problem.linearize(turns, work);
         let (multipliers, slope) = reduced_gradient(problem, turns, work);
         let mut free = work.free.iter().filter(|free| **free).count();
         if free <= constraints || slope <= STATIONARY * (2.0 * energy).sqrt().max(1e-3) {
             return (true, steps);
         }
+        // Newton step in the tangent of the target. Where no damping helps, a turn whose limit leaves nothing of the
+        // step is fixed for this step.
         tangent_step(problem, turns, &multipliers, damping, work);
         trial.clone_from(turns);
-        // Where no damping helps, a turn whose limit leaves nothing of the step is held for this step.
         while let Some(stuck) = step_to_limit(problem, &mut trial, work).filter(|_| hold) {
             work.free[stuck] = false;
             free -= 1;
@@ -50,6 +52,7 @@ pub(super) fn descend(
             tangent_step(problem, turns, &multipliers, damping, work);
             trial.clone_from(turns);
         }
+        // Back onto the target: the step counts if the energy falls.
         let no_freedom = hold && free <= constraints;
         let on = !no_freedom && problem.move_onto_target(&mut trial, work) <= tolerance;
         let next = problem.energy(&trial);
@@ -76,6 +79,7 @@ pub(super) fn descend(
                 (hold, damping) = (true, 0.0);
                 continue;
             }
+            // A shorter step next time.
             damping = (10.0 * damping).max(0.1);
         }
     }

@@ -11,7 +11,16 @@ use super::two_section::TwoSections;
 use crate::error::{InvalidInput, finite};
 use crate::status::Status;
 
-/// What is asked of the tip.
+/// Goal of the tip.
+///
+/// ```
+/// use nalgebra::Vector2;
+/// use tdcr::planar::Goal;
+///
+/// // The tip at (0.2, 0.06) m, pointing along x; no section turns by more than 3 rad.
+/// let goal = Goal { point: Vector2::new(0.2, 0.06), heading: Some(0.0), limits: vec![3.0] };
+/// assert_eq!(goal.limits.len(), 1);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Goal {
     /// Position \[m\].
@@ -22,7 +31,14 @@ pub struct Goal {
     pub limits: Vec<f64>,
 }
 
-/// How precisely and from how many starts.
+/// Settings of the inverse: tolerance, steps, starts.
+///
+/// ```
+/// use tdcr::planar::InverseSettings;
+///
+/// let settings = InverseSettings { starts: 100, ..InverseSettings::default() };
+/// assert!(settings.validate().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseSettings {
     /// Miss of the target that counts as none \[m\]; a heading counts one trunk length per whole turn.
@@ -60,6 +76,20 @@ impl InverseSettings {
 }
 
 /// Turns found, and how well they do.
+///
+/// ```
+/// use nalgebra::Vector2;
+/// use tdcr::planar::{Goal, InverseSettings, Trunk, inverse};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let trunk = Trunk::new(vec![0.14, 0.12, 0.1], 0.06)?;
+/// let goal = Goal { point: Vector2::new(0.25, 0.1), heading: None, limits: vec![3.0] };
+/// let found = inverse(&trunk, &goal, &InverseSettings::default())?;
+/// assert_eq!(found.status, tdcr::Status::Converged);
+/// assert!(found.error < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inverse {
     /// Turn of every section \[rad\].
@@ -93,7 +123,7 @@ pub fn inverse(
     Ok(solver.into_inverse(starts))
 }
 
-/// As [`inverse`], until `stop` is set, which is looked at in every step: then there is no answer.
+/// Inverse that a flag stops: [`inverse`], with no answer once `stop` is set, which every step reads.
 ///
 /// # Errors
 /// As [`inverse`].
@@ -108,7 +138,7 @@ pub fn inverse_until(
     Ok((!solver.is_stopped()).then(|| solver.into_inverse(starts)))
 }
 
-/// As [`inverse`], from given turns alone: the least energy near them, or the nearest point.
+/// Inverse from given turns alone: the least energy near them, or the nearest point.
 ///
 /// # Errors
 /// As [`inverse`], and for turns that do not fit the trunk.
@@ -263,7 +293,7 @@ impl<'a> Solver<'a> {
         Some(two.nearest(self.problem.target.re, self.problem.target.im).0.to_vec())
     }
 
-    /// Whole turns of the heading do not matter: those nearest to a start's are taken.
+    /// Adds whole turns to the heading, those nearest to a start's sum of turns.
     pub(super) fn unwind(&mut self, start: &[f64]) {
         let turn = std::f64::consts::TAU;
         let sum: f64 = start.iter().sum();

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::chord::{Chord, Point};
 
-/// A tip to reach: position, and heading where one is wanted.
+/// Equations of the tip: position, and heading where one is asked for.
 #[derive(Clone, Debug)]
 pub(super) struct TipEquations {
     pub(super) lengths: Vec<f64>,
@@ -224,7 +224,7 @@ impl TipEquations {
     }
 
     /// `(J^T J + sum off_k H_k + damping/lengths) step = -gradient`, entries of zero gradient at a
-    /// limit held.
+    /// limit fixed.
     fn damped_newton(
         &self,
         gradient: &[f64],
@@ -257,7 +257,7 @@ impl TipEquations {
     }
 }
 
-/// Solves a dense system in place by elimination with row pivots; a singular one gives what it gives.
+/// Solves a dense system in place by elimination with row pivots; where it is singular the unknown is zero.
 pub(super) fn eliminate(matrix: &mut [f64], right: &mut [f64]) {
     let n = right.len();
     for k in 0..n {

@@ -11,6 +11,15 @@ use super::dense::{backward, cholesky, forward};
 const FLAT: f64 = 1e-14;
 
 /// Buffers, and the answer.
+///
+/// ```
+/// use tdcr::solve::bounded_program::BoundedProgram;
+///
+/// // min x² / 2 + y² / 2 - x + y with x, y >= 0.
+/// let mut program = BoundedProgram::default();
+/// assert!(program.solve(&[1.0, 0.0, 0.0, 1.0], &[1.0, -1.0], &[0.0, 0.0], |_| false));
+/// assert_eq!(program.step, [1.0, 0.0]);
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct BoundedProgram {
     /// The minimiser.
@@ -67,6 +76,7 @@ impl BoundedProgram {
             if count == 0 {
                 return true;
             }
+            // M and right-hand side of the free variables, the others fixed.
             self.factor.clear();
             self.trial.clear();
             for (a, &i) in self.free.iter().enumerate() {
@@ -75,11 +85,13 @@ impl BoundedProgram {
                 let fixed = (0..right.len()).filter(|j| !self.free.contains(j));
                 self.trial.push(right[i] - fixed.map(|j| at(i, j) * self.step[j]).sum::<f64>());
             }
+            // Their unconstrained minimum.
             if !cholesky(&mut self.factor, count) {
                 return false;
             }
             forward(&self.factor, count, &mut self.trial);
             backward(&self.factor, count, &mut self.trial);
+            // Share of the way until the first of them meets its bound.
             let (mut share, mut first) = (1.0_f64, None);
             for (a, &i) in self.free.iter().enumerate() {
                 let (from, to) = (self.step[i], self.trial[a]);
@@ -95,6 +107,7 @@ impl BoundedProgram {
                 let moved = self.step[i] + share * (self.trial[a] - self.step[i]);
                 self.step[i] = moved.max(lower[i]);
             }
+            // Variables on their bounds are free no more.
             let Some(first) = first else { return true };
             self.step[first] = lower[first];
             let step = &self.step;

@@ -5,6 +5,15 @@ use super::dense::dot;
 use super::quadratic_program::{Outcome, QuadraticProgram, Rows};
 
 /// `|(z_first, z_first+1)| <= radius`, or `<= radius * z_scale`.
+///
+/// ```
+/// use tdcr::solve::convex_region::{Disc, Region};
+///
+/// let mut region = Region::new(3);
+/// // A disc in the first two unknowns whose radius is half the third one.
+/// region.add_disc(Disc { first: 0, radius: 0.5, scale: Some(2) });
+/// assert!(region.contains(&[0.9, 0.0, 2.0]) && !region.contains(&[0.9, 0.0, 1.0]));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
     /// Index of the first of the two unknowns.
@@ -16,7 +25,7 @@ pub struct Disc {
 }
 
 impl Disc {
-    /// How far outside a point is; negative inside.
+    /// Distance by which a point is outside; negative inside.
     fn excess(&self, z: &[f64]) -> f64 {
         let reach = self.scale.map_or(self.radius, |k| self.radius * z[k]);
         length(z, self.first) - reach
@@ -34,6 +43,15 @@ fn length(z: &[f64], first: usize) -> f64 {
 }
 
 /// A convex region.
+///
+/// ```
+/// use tdcr::solve::convex_region::Region;
+///
+/// let mut region = Region::new(2);
+/// region.add_equation(&[1.0, 1.0], 1.0);
+/// region.add_bound(&[1.0, 0.0], 0.25);
+/// assert!(region.contains(&[0.25, 0.75]) && !region.contains(&[0.5, 0.5]));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Region {
     size: usize,
@@ -168,7 +186,7 @@ impl Region {
         }
     }
 
-    /// Whether a point is inside, to rounding.
+    /// True when a point is inside, to rounding.
     #[must_use]
     pub fn contains(&self, z: &[f64]) -> bool {
         self.violation(z) <= INSIDE
@@ -212,6 +230,16 @@ impl Region {
 }
 
 /// Buffers of [`Region::restore`].
+///
+/// ```
+/// use tdcr::solve::convex_region::{Region, RestoreScratch};
+///
+/// let mut region = Region::new(2);
+/// region.add_bound(&[1.0, 0.0], 1.0);
+/// let (mut scratch, mut point) = (RestoreScratch::default(), [3.0, 4.0]);
+/// assert!(region.restore(&mut point, &mut scratch));
+/// assert!((point[0] - 1.0).abs() < 1e-12 && point[1] == 4.0);
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct RestoreScratch {
     program: QuadraticProgram,

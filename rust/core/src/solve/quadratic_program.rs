@@ -9,13 +9,21 @@ use super::dense::{backward, cholesky, dot, forward};
 
 /// Constraints `normal_k . p = offset_k` for the first `equalities` rows, `normal_k . p <= offset_k` for
 /// the rest. Normals are about as long as 1.
+///
+/// ```
+/// use tdcr::solve::quadratic_program::Rows;
+///
+/// let mut rows = Rows::default();
+/// rows.push(2, 1.0).copy_from_slice(&[1.0, 0.0]);
+/// assert!(rows.allow(2, &[0.5, 9.0]) && !rows.allow(2, &[1.5, 0.0]));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
     /// Normals one after the other, as many numbers each as there are unknowns.
     pub normals: Vec<f64>,
     /// Right-hand sides.
     pub offsets: Vec<f64>,
-    /// How many of the rows, from the first, are equations.
+    /// Number of equations, which are the first rows.
     pub equalities: usize,
 }
 
@@ -35,7 +43,7 @@ impl Rows {
         &mut self.normals[start..]
     }
 
-    /// Whether a step meets all rows, to rounding.
+    /// True when a step meets all rows, to rounding.
     #[must_use]
     pub fn allow(&self, size: usize, step: &[f64]) -> bool {
         self.offsets.iter().enumerate().all(|(k, offset)| {
@@ -51,14 +59,27 @@ impl Rows {
     }
 }
 
-/// How a program ended.
+/// Outcome of a program.
+///
+/// ```
+/// use tdcr::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
+///
+/// // p <= -1 and -p <= -1 exclude each other.
+/// let mut rows = Rows::default();
+/// rows.push(1, -1.0)[0] = 1.0;
+/// rows.push(1, -1.0)[0] = -1.0;
+/// let mut program = QuadraticProgram::default();
+/// program.factor_identity(1);
+/// program.gradient = vec![0.0];
+/// assert_eq!(program.solve(&rows), Outcome::Infeasible);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The minimum.
     Solved,
     /// No point meets the constraints.
     Infeasible,
-    /// The arithmetic broke down, or the active set went on changing.
+    /// The arithmetic broke down, or the active set kept changing.
     Failed,
 }
 
@@ -68,8 +89,8 @@ const MET: f64 = 1e-13;
 /// An equation is dependent on others when the square of its part outside them, in the Hessian's metric, is
 /// this small a share of it: rows of a Jacobian near where it is singular.
 const DEPENDENT: f64 = 1e-11;
-/// The same for an inequality: independent rows come as near as the inverse of the Hessian's condition
-/// (1e13 for least squares with freedom left), dependent ones as near as the rounding of their images.
+/// Dependence of an inequality: independent rows come as near as the inverse of the Hessian's condition
+/// (1e13 for least squares with freedom), dependent ones as near as the rounding of their whitened rows.
 const PARALLEL: f64 = 1e-16;
 
 /// A row that depends on active ones contradicts them when it is violated by more than this; below, it is
@@ -77,6 +98,20 @@ const PARALLEL: f64 = 1e-16;
 const CONTRADICTION: f64 = 1e-9;
 
 /// Buffers of a solve, and its answer.
+///
+/// ```
+/// use tdcr::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
+///
+/// // min |p|² / 2 - 2 p_0 with p_0 + p_1 <= 1.
+/// let mut rows = Rows::default();
+/// rows.push(2, 1.0).copy_from_slice(&[1.0, 1.0]);
+/// let mut program = QuadraticProgram::default();
+/// program.factor_identity(2);
+/// program.gradient = vec![-2.0, 0.0];
+/// assert_eq!(program.solve(&rows), Outcome::Solved);
+/// assert!((program.step[0] - 1.5).abs() < 1e-12 && (program.step[1] + 0.5).abs() < 1e-12);
+/// assert!((program.multipliers[0] - 0.5).abs() < 1e-12);
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct QuadraticProgram {
     size: usize,
@@ -142,7 +177,7 @@ impl QuadraticProgram {
         backward(&self.factor, self.size, &mut self.step);
     }
 
-    /// The same under `rows`.
+    /// Minimises `p . H p / 2 + gradient . p` under `rows`, with the Hessian factored last.
     pub fn solve(&mut self, rows: &Rows) -> Outcome {
         self.solve_free();
         if rows.equalities > 0 && !self.meet_equations(rows) {
@@ -174,7 +209,7 @@ impl QuadraticProgram {
     }
 
     /// Largest component of `gradient + sum_k multiplier_k normal_k` after a solve under `rows`: 0 where
-    /// the gradient is held by the constraints.
+    /// the constraints balance the gradient.
     #[must_use]
     pub fn lagrangian_gradient(&self, rows: &Rows) -> f64 {
         (0..self.size).fold(0.0, |most, i| {
@@ -229,7 +264,7 @@ impl QuadraticProgram {
         })
     }
 
-    /// Moves to the minimum with a violated row active as well, dropping those that let go.
+    /// Moves to the minimum with a violated row active as well, dropping rows whose multiplier vanishes.
     fn activate(&mut self, rows: &Rows, row: usize, violation: f64) -> Outcome {
         let size = self.size;
         let mut violation = violation;
@@ -238,11 +273,14 @@ impl QuadraticProgram {
         self.whitened.extend_from_slice(rows.normal(size, row));
         forward(&self.factor, size, &mut self.whitened);
         let squared_norm = dot(&self.whitened, &self.whitened);
+        // Each pass drops an active row that lets go, until the new one is active too.
         loop {
+            // Primal direction z and dual direction r of the paper: L⁻¹n outside and inside the active rows.
             self.project();
             let orthogonal = dot(&self.orthogonal, &self.orthogonal);
             self.solve_triangle();
             let (length, blocking) = self.blocking_constraint(rows.equalities);
+            // A row that depends on the active ones contradicts them or holds with them.
             let independent = orthogonal > PARALLEL * squared_norm;
             if !independent && blocking == usize::MAX {
                 if violation > CONTRADICTION || multiplier > 0.0 {
@@ -253,6 +291,7 @@ impl QuadraticProgram {
             }
             // |outside|^2 is the curvature along the move.
             let full_step = if independent { violation / orthogonal } else { f64::INFINITY };
+            // Step length: full (t2), or partial up to the blocking multiplier (t1).
             let step = full_step.min(length);
             if independent {
                 self.direction.clone_from(&self.orthogonal);
@@ -266,6 +305,7 @@ impl QuadraticProgram {
                 *held -= step * along;
             }
             multiplier += step;
+            // A full step makes the row active; a partial one drops the blocking row.
             if full_step <= length {
                 self.active.push(row);
                 self.multipliers.push(multiplier);
@@ -282,7 +322,7 @@ impl QuadraticProgram {
         }
     }
 
-    /// How far a move can go until the multiplier of an active inequality vanishes, and which.
+    /// Longest step (t1 of the paper) until the multiplier of an active inequality vanishes, and its place.
     fn blocking_constraint(&self, equalities: usize) -> (f64, usize) {
         let (mut length, mut blocking) = (f64::INFINITY, usize::MAX);
         for (k, &row) in self.active.iter().enumerate() {

@@ -22,6 +22,26 @@ use crate::status::Status;
 pub(super) use starts::arc_to;
 
 /// Buffers of a solve and the arcs it found.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
+/// # use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// # let (bounds, settings) = (Bounds::default(), InverseSettings::default());
+/// # let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
+/// let mut scratch = inverse.scratch();
+/// inverse.solve(&Target::Position(Vector3::new(0.05, 0.0, 0.18)), None, &mut scratch);
+/// assert_eq!(inverse.arcs(&scratch).len(), 1);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scratch<'a> {
     problem: ArcProblem<'a>,
@@ -38,6 +58,30 @@ impl<'a> Scratch<'a> {
 }
 
 /// A robot prepared for inverse solves with the constant-curvature model.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::constant_curvature::{Arc, ConstantCurvatureSettings, Plan};
+/// use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let (bounds, settings) = (Bounds::default(), InverseSettings::default());
+/// let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
+/// let tip = Arc::new(5.0, 1.0, 0.2).frame(1.0).translation;
+/// let mut scratch = inverse.scratch();
+/// let answer = inverse.solve(&Target::Position(tip), None, &mut scratch);
+/// assert_eq!(answer.status, tdcr::Status::Converged);
+/// let mut displacements = [0.0; 3];
+/// inverse.write_displacements(&scratch, &mut displacements);
+/// assert!((inverse.arcs(&scratch)[0].kappa() - 5.0).abs() < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct ConstantCurvatureInverse<'a> {
     robot: &'a Robot,
@@ -119,7 +163,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         }
     }
 
-    /// Seeks arcs that bring the tool to `target`; first from `start`, if given.
+    /// Solves for arcs that bring the tool to `target`; first from `start`, if given.
     pub fn solve(&self, target: &Target, start: Option<&[Arc]>, work: &mut Scratch<'_>) -> Answer {
         work.problem.pose_residual.set_target(*target);
         let options = self.options(&work.problem, self.settings.starts);
@@ -142,7 +186,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         Self::answer(found, &work.problem)
     }
 
-    /// Seeks again from where the last solve in `work` ended, as along a path; from other starts only when
+    /// Solves again from the point where the last solve in `work` ended, as along a path; from other starts only when
     /// that fails.
     pub fn follow(&self, target: &Target, work: &mut Scratch<'_>) -> Answer {
         if work.search.point.len() != self.space.search.region.size() {
@@ -165,7 +209,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         self.solutions_in(target, &mut self.scratch())
     }
 
-    /// The same in given buffers.
+    /// Distinct answers as in [`Self::solutions`], in buffers of the caller.
     #[must_use]
     pub fn solutions_in(&self, target: &Target, work: &mut Scratch<'_>) -> Vec<Solution> {
         work.problem.pose_residual.set_target(*target);
@@ -245,7 +289,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
         self.space.write_displacements(&self.plan, &work.search.point, place);
     }
 
-    /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
+    /// Reason why the last solve in `work` did not converge, in a sentence; empty when it did.
     #[must_use]
     pub fn message(&self, answer: &Answer, work: &Scratch<'_>) -> String {
         let held = self.space.active_bounds(&work.search.point);
@@ -263,7 +307,7 @@ impl<'a> ConstantCurvatureInverse<'a> {
     }
 }
 
-/// What a first guess may miss \[m, rad\], and its starts.
+/// Tolerance of a first guess \[m, rad\], and its starts.
 const GUESS: f64 = 1e-6;
 const FEW: usize = 8;
 
@@ -327,6 +371,27 @@ const FAR: f64 = 1e3;
 const DISTINCT: f64 = 1e-6;
 
 /// One of several answers.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
+/// # use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// # let (bounds, settings) = (Bounds::default(), InverseSettings::default());
+/// # let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
+/// let tip = tdcr::constant_curvature::Arc::new(5.0, 1.0, 0.2).frame(1.0).translation;
+/// let solutions = inverse.solutions(&Target::Position(tip));
+/// assert!(solutions.iter().any(|solution| (solution.arcs[0].kappa() - 5.0).abs() < 1e-6));
+/// assert!(solutions.is_sorted_by(|a, b| a.energy <= b.energy));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
     /// Its arcs, base first.
@@ -335,8 +400,8 @@ pub struct Solution {
     pub displacements: Vec<f64>,
     /// Its bending energy, in a unit common to the answers.
     pub energy: f64,
-    /// How many starts led to it.
+    /// Number of starts that led to it.
     pub hits: usize,
-    /// How it ended.
+    /// Outcome of its search.
     pub answer: Answer,
 }

@@ -1,4 +1,4 @@
-//! Where searches begin.
+//! Starting points of the search over arcs.
 
 use std::f64::consts::{PI, TAU};
 
@@ -60,7 +60,7 @@ impl ConstantCurvatureInverse<'_> {
         let mut draws = ChaCha8Rng::seed_from_u64(self.settings.seed);
         draws.set_stream(k as u64);
         for &SegmentRange { widest, shortest, longest } in &self.space.draws {
-            // Segments seldom turn by more than half a turn: every other start looks no further.
+            // Segments seldom turn by more than half a turn: every other start stays within it.
             let widest = if k.is_multiple_of(2) { widest.min(PI) } else { widest };
             let angle = widest * draws.random::<f64>();
             let (sin, cos) = (TAU * draws.random::<f64>()).sin_cos();

@@ -1,4 +1,4 @@
-//! Displacements that bring the disks to wanted places.
+//! Displacements that bring the disks to given positions.
 
 use std::sync::atomic::AtomicBool;
 
@@ -23,27 +23,47 @@ const BEND: f64 = 1.0;
 /// Most tendons.
 const TENDONS: usize = 63;
 
-/// What was found for wanted places.
+/// Answer of an inverse for disk positions.
+///
+/// ```
+/// use tdcr::inverse::{Bounds, InverseSettings, RodInverse};
+/// use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let inverse = RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default())?;
+/// // The disks as they are at rest.
+/// let positions: Vec<_> =
+///     robot.rest_frames().iter().skip(1).map(|frame| Some(frame.translation)).collect();
+/// let found = inverse.solve_positions(&positions, None, None)?;
+/// assert!(found.message.is_empty() && found.displacements.iter().all(|d| d.abs() < 1e-8));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct PositionsAnswer {
-    /// How it ended; its distance is the largest of a disk.
+    /// Outcome; its distance is the largest of a disk.
     pub answer: Answer,
     /// Tendon displacements \[m\].
     pub displacements: Vec<f64>,
     /// Tensions, in the unit of the results.
     pub tensions: Vec<f64>,
-    /// What stood in the way; empty when every place is met.
+    /// Reason why it did not converge; empty when every position is met.
     pub message: String,
-    /// The shape, where displacements do not say which it is.
+    /// Shape, where displacements do not determine it.
     pub state: Option<State>,
 }
 
 impl RodInverse<'_> {
-    /// Seeks what brings disks nearest to their places \[m\], world frame, one per disk from the first, or none: least
-    /// sum of squared distances. First from a shape with its tensions, if given. Freedom that the places leave is not spent.
+    /// Brings disks as near as possible to positions \[m\], world frame, one per disk from the first, or none: least
+    /// sum of squared distances. First from a shape with its tensions, if given. Remaining freedom is not spent.
     ///
     /// # Errors
-    /// `InvalidInput` for another number of places than disks, none at all, one that is not finite or further away than
+    /// `InvalidInput` for another number of positions than disks, none at all, one that is not finite or beyond
     /// a million lengths, and more than 63 tendons.
     pub fn solve_positions(
         &self,
@@ -149,7 +169,7 @@ impl RodInverse<'_> {
         placed
     }
 
-    /// The k-th start: arcs along the places; as for the tool at the last of them; random ones.
+    /// Start k: arcs along the positions; a single arc to the last of them; random ones.
     fn positions_start(&self, places: &[Option<Vector3<f64>>], k: usize, point: &mut Vec<f64>) {
         if k == 0 {
             self.tensions_for_bends(&bends_along(places, self.robot.backbone().lengths()), point);
@@ -167,12 +187,12 @@ impl RodInverse<'_> {
     }
 }
 
-/// Bends of tangent arcs towards places one after the other, in the base's frame; straight where none follows.
+/// Bends of tangent arcs towards positions one after the other, in the base's frame; straight where none follows.
 fn bends_along(places: &[Option<Vector3<f64>>], lengths: &[f64]) -> Vec<Vector2<f64>> {
     let mut frame = Pose::identity();
     let mut bends = Vec::with_capacity(places.len());
     for (i, length) in lengths.iter().enumerate() {
-        // Towards the next place that is known, over all subsegments up to there.
+        // Towards the next known position, over all subsegments up to there.
         let next = places[i..].iter().position(Option::is_some);
         let bend = match next.and_then(|more| Some((more, places[i + more]?))) {
             None => Vector2::zeros(),

@@ -1,4 +1,4 @@
-//! Whether the displacements of an answer lead to it from rest, where a robot has more than one shape.
+//! Forward solves from rest with the displacements of an answer, where a robot has more than one shape.
 
 use std::sync::atomic::AtomicBool;
 
@@ -16,26 +16,26 @@ use crate::status::Status;
 /// The tool comes back to where it was to this share of the robot's length and its tool's reach, and to this angle
 /// \[rad\].
 const SAME_SHAPE: (f64, f64) = (1e-8, 1e-8);
-/// The same shape within the precision of forward solves where all tendons of a segment pull and depend on each other;
-/// other shapes are further off.
+/// Tolerances of the pose where all tendons of a segment pull and depend on each other: forward solves are no
+/// better, and other shapes are further off.
 const NEARLY_SAME_SHAPE: (f64, f64) = (1e-6, 1e-5);
-/// Tendons without tension are let out by this share of the robot's length: as long as their way to the last bit, they
-/// and those that depend on them lock on the way from rest.
+/// Slack allowance of tendons without tension, as a share of the robot's length: as long as their path to the last
+/// bit, they and those that depend on them lock during the solve from rest.
 const SLACK_ALLOWANCE: f64 = 1e-8;
-/// So many answers that rest does not lead to, before one of them has to do.
+/// Number of answers that rest does not lead to, before one of them is returned.
 const ANSWERS: usize = 8;
-/// Places of an answer whatever its tensions, and of the first one, which has to do if rest leads to none.
+/// Slots of the last answer, and of the first one, which is returned if rest leads to none.
 const LAST_SLOT: usize = 0;
 const FIRST_SLOT: usize = 1;
 
-/// The forward model from rest.
+/// Forward model that tests answers by a solve from rest.
 #[derive(Debug)]
 pub(super) struct FromRest<'a> {
     rod: LoadedRod<'a>,
     robot: &'a Robot,
     work: Scratch,
     stop: Option<&'a AtomicBool>,
-    /// Whether rest leads to the last answer.
+    /// True when rest leads to the last answer.
     leads_to_answer: bool,
 }
 
@@ -44,7 +44,7 @@ impl<'a> FromRest<'a> {
         Self { rod: rod.clone(), robot, work: Scratch::default(), stop, leads_to_answer: true }
     }
 
-    /// Searches on until rest leads to an answer, or for a few more answers; the first is kept otherwise.
+    /// Searches until rest leads to an answer, through at most eight of them; else the first one is returned.
     pub(super) fn search<const R: usize, G: Goal<R>>(
         &mut self,
         problem: &mut TensionProblem<'_, G>,
@@ -53,9 +53,10 @@ impl<'a> FromRest<'a> {
         options: SearchOptions<'_>,
         mut start: impl FnMut(usize, &mut Vec<f64>),
     ) -> SearchOutcome {
+        // The first answer that meets the target, whatever its tensions.
         let mut meet = SearchOptions { freedom: Freedom::None, ..options };
         self.leads_to_answer = true;
-        // Not as the row before left it.
+        // The row before may have set another allowance.
         self.allow_slack(problem);
         let first = search.run(problem, space, meet, &mut start);
         if first.status != Status::Converged {
@@ -67,6 +68,7 @@ impl<'a> FromRest<'a> {
         for tried in 1..=ANSWERS {
             let point = search.point.clone();
             problem.rod.keep(LAST_SLOT);
+            // Its freedom goes to the least sum T² first, if rest leads to that answer too.
             if options.freedom != Freedom::None {
                 let lower =
                     SearchOptions { starts: 1, fall_back: false, nearest: false, ..options };
@@ -83,12 +85,14 @@ impl<'a> FromRest<'a> {
                 }
                 restore_answer(problem, search, LAST_SLOT, &point);
             }
+            // Else the answer with the tensions that the descent found.
             if self.leads_to(problem) {
                 return SearchOutcome { iterations, starts, ..found };
             }
             if tried == ANSWERS || found.starts >= meet.starts || search.is_stopped() {
                 break;
             }
+            // Other starts may lead to other shapes.
             meet.first += found.starts;
             meet.starts -= found.starts;
             (meet.fall_back, meet.nearest) = (false, false);
@@ -98,12 +102,13 @@ impl<'a> FromRest<'a> {
                 break;
             }
         }
+        // Rest leads to none of them: the first one, with a message.
         self.leads_to_answer = false;
         restore_answer(problem, search, FIRST_SLOT, &first_point);
         SearchOutcome { iterations, starts, ..first }
     }
 
-    /// Whether the displacements at hand bring the tool to where it is: with slack tendons let out by a hair, or without.
+    /// True when a forward solve with the displacements brings the tool back, with the slack allowance or without.
     fn leads_to<G>(&mut self, problem: &mut TensionProblem<'_, G>) -> bool {
         self.allow_slack(problem);
         if self.leads_within(SAME_SHAPE, problem) {
@@ -117,7 +122,7 @@ impl<'a> FromRest<'a> {
         comes
     }
 
-    /// Lets tendons without tension out by a hair.
+    /// Lets tendons without tension out by the slack allowance.
     pub(super) fn allow_slack<G>(&self, problem: &mut TensionProblem<'_, G>) {
         problem.slack_allowance = SLACK_ALLOWANCE * self.robot.backbone().total_length();
     }
@@ -140,7 +145,7 @@ impl<'a> FromRest<'a> {
         report.status == Status::Converged && off <= near * reach && turned <= turn
     }
 
-    /// What there is to say of an answer that meets its target.
+    /// Message about an answer that meets its target.
     pub(super) fn message(&self) -> &'static str {
         if self.leads_to_answer {
             return "";
@@ -153,7 +158,7 @@ impl<'a> FromRest<'a> {
     }
 }
 
-/// Back to an answer that was kept, evaluated.
+/// Restores an answer from its slot and evaluates it.
 fn restore_answer<const R: usize, G: Goal<R>>(
     problem: &mut TensionProblem<'_, G>,
     search: &mut Multistart<'_, R>,

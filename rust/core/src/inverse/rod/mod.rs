@@ -35,21 +35,63 @@ pub use disk_positions::PositionsAnswer;
 use from_rest::FromRest;
 
 /// Buffers of a solve and the tensions it found.
+///
+/// ```
+/// use tdcr::inverse::{Bounds, InverseSettings, Inverter, RodInverse};
+/// use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let inverse = RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default())?;
+/// // One set of buffers serves many targets.
+/// let scratch = inverse.buffers(None);
+/// # drop(scratch);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct RodScratch<'a> {
     pub(super) problem: TensionProblem<'a>,
     search: Multistart<'a>,
     guess: Option<constant_curvature::Scratch<'a>>,
     bends: Vec<Vector2<f64>>,
-    /// Whether the last solve met its target.
+    /// True when the last solve met its target.
     met: bool,
-    /// The point and the tool's place of the row before the last, along a path.
+    /// Unknowns and tool position of the row before the last, along a path.
     before: Option<(Vec<f64>, Vector3<f64>)>,
-    /// Whether answers are what rest leads to, where there is more than one shape.
+    /// Test of answers by solves from rest, where there is more than one shape.
     from_rest: Option<FromRest<'a>>,
 }
 
 /// A robot prepared for inverse solves with the rod model.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::inverse::{Bounds, InverseSettings, Inverter, RodInverse, Target};
+/// use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let inverse = RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default())?;
+/// let mut scratch = inverse.buffers(None);
+/// // The tip of an arc of 1 rad.
+/// let target = Target::Position(Vector3::new(0.091_939_5, 0.0, 0.168_294_2));
+/// let answer = inverse.solve(&target, None, &mut scratch);
+/// assert!(answer.distance < 1e-2);
+/// let mut tensions = [0.0; 3];
+/// inverse.write_tensions(&scratch, &mut tensions);
+/// assert!(tensions.iter().all(|tension| *tension >= 0.0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct RodInverse<'a> {
     robot: &'a Robot,
@@ -60,7 +102,7 @@ pub struct RodInverse<'a> {
     units: Vec<f64>,
     /// Lowest and highest displacement of every tendon \[m\].
     ranges: Vec<(f64, f64)>,
-    /// What bounds of the region hold back.
+    /// Names of the bounds of the region, for messages.
     labels: Vec<String>,
     /// The rod at rest.
     rest: FreeRod<'a>,
@@ -72,10 +114,10 @@ pub struct RodInverse<'a> {
     fault: Arc<Mutex<Option<Fault>>>,
 }
 
-/// No tension is more than what would bend the rod by two turns alone, unless bounds ask for it \[rad\]: targets just out
-/// of reach are led to infinite ones, which stretch it.
+/// Largest unknown \[rad\], two turns of the rod by one tendon alone, unless bounds ask for more: targets just out of
+/// reach drive tensions to infinity, which stretches the rod.
 const MOST: f64 = 2.0 * TAU;
-/// Swarms and random starts seek unknowns up to here \[rad\].
+/// Largest unknown of swarms and random starts \[rad\].
 const WIDEST: f64 = 4.0;
 /// A tendon without leverage at rest counts as if its holes were this share of the robot's length off the backbone.
 const LEVER: f64 = 1e-3;
@@ -123,7 +165,7 @@ impl<'a> RodInverse<'a> {
         Ok(inverse)
     }
 
-    /// The same among obstacles and under loads, in a scene that was made of this robot and its plan.
+    /// Inverse among obstacles and under loads, in a scene that was made of this robot and its plan.
     ///
     /// # Errors
     /// As [`LoadedRod::new`].
@@ -132,13 +174,13 @@ impl<'a> RodInverse<'a> {
         Ok(Self { loaded: Some(loaded), ..self })
     }
 
-    /// What a function of an obstacle ended all work with, if it did.
+    /// Fault with which a function of an obstacle ended all work, if it did.
     #[must_use]
     pub fn take_fault(&self) -> Option<Fault> {
         self.fault.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Solves unless a function of an obstacle failed before, and keeps its fault if it does now.
+    /// Solves unless a function of an obstacle failed before, and keeps its fault if it fails now.
     fn solve_without_fault(
         &self,
         work: &mut RodScratch<'_>,
@@ -193,7 +235,7 @@ impl<'a> RodInverse<'a> {
             self.labels.push(format!("tension of '{name}'"));
             normal[k] = -1.0;
             self.space.region.add_bound(&normal, -lower);
-            // A slack tendon is no news.
+            // A slack tendon has no label: messages do not name it.
             self.labels.push(if lower > 0.0 {
                 format!("pretension of '{name}'")
             } else {
@@ -204,7 +246,7 @@ impl<'a> RodInverse<'a> {
         }
     }
 
-    /// Seeks from the point at hand, if it is one to start from, then from all starts.
+    /// Searches from the current point, if `given`, then from all starts.
     fn search(
         &self,
         target: &Target,
@@ -324,7 +366,7 @@ impl Inverter for RodInverse<'_> {
         })
     }
 
-    /// In steps between which the tool is moved and turned evenly, where one step does not lead there without a
+    /// Moves and turns the tool in even steps where one step does not lead there without a
     /// jump; from a few other starts only when that fails, and then `starts` is more than 1.
     fn follow(&self, target: &Target, work: &mut RodScratch<'_>) -> Answer {
         self.solve_without_fault(work, |work| self.track(target, work))

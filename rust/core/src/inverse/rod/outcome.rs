@@ -1,15 +1,15 @@
-//! How a search of the rod ended, and what is said of it.
+//! Messages about a search of the rod that did not converge.
 
 use super::RodInverse;
 use crate::inverse::outcome::Answer;
 use crate::inverse::tension_problem::TensionProblem;
 use crate::rod::contact::LoadedRod;
 
-/// A bound that is this near holds back \[rad, m\].
+/// Distance within which a bound is active \[rad, m\].
 const AT_EDGE: f64 = 1e-9;
 
 impl RodInverse<'_> {
-    /// What to say of bounds that exclude every shape, or of a robot of which none was found.
+    /// Message about bounds that exclude every shape, or about a robot of which none was found.
     pub(super) fn no_shape_message(&self, answer: &Answer) -> String {
         if !answer.distance.is_nan() {
             return "the bounds leave the robot no shape".to_owned();
@@ -19,7 +19,7 @@ impl RodInverse<'_> {
         format!("none of {} starts leads to a shape of the robot{own}", answer.starts)
     }
 
-    /// Bounds that hold a point back.
+    /// Names of the bounds that are active at a point.
     pub(super) fn active_bounds<G>(
         &self,
         point: &[f64],

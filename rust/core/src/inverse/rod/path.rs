@@ -14,12 +14,12 @@ const JUMP: f64 = 0.5;
 /// Nor, on the way to less tension, by more than this times the tool's way over the robot's length.
 const RATE: f64 = 50.0;
 const SHORTEST: f64 = 1.0 / 64.0;
-/// Where the tool goes so many times as far as before, or further, no start is read off the way before.
+/// Longest step over the step before for which the start is extrapolated.
 const FARTHEST: f64 = 2.0;
 /// Starts of a target on a path that steps do not lead to.
 const FEW: usize = 16;
 
-/// Where a step along a path led.
+/// Outcome of a step along a path.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum StepOutcome {
     Reached,
@@ -28,7 +28,7 @@ enum StepOutcome {
 }
 
 impl RodScratch<'_> {
-    /// Descends from the point at hand to the target aimed at; whether no unknown is further than a limit from
+    /// Descends from the current point to the current target, and tests that no unknown is further than a limit from
     /// where it was.
     fn descend(
         &mut self,
@@ -50,7 +50,7 @@ impl RodScratch<'_> {
 }
 
 impl RodInverse<'_> {
-    /// Goes from the point at hand to the target aimed at; nothing where steps do not lead there.
+    /// Moves from the current point to the current target in steps; none where they do not lead there.
     pub(super) fn track_in_steps(&self, work: &mut RodScratch<'_>) -> Option<Answer> {
         let options = SearchOptions { fall_back: false, nearest: false, ..self.options(1) };
         let (from, to) = (work.problem.rod.motion().tool, work.problem.goal.pose_residual.target());
@@ -59,11 +59,12 @@ impl RodInverse<'_> {
         let mut last = work.search.point.clone();
         while done < 1.0 {
             let next = (done + stride).min(1.0);
+            // Target at an even share of the way: position along the line, rotation about one axis.
             work.problem.goal.pose_residual.interpolate_target(&from, &to, next);
             if stride >= 1.0
                 && let Some((point, place)) = &work.before
             {
-                // On as before, by the share of the way that the tool goes now.
+                // Start extrapolated by the unknowns' last change, over the ratio of the tool's ways.
                 let share = (to.position() - from.translation).norm()
                     / (from.translation - *place).norm().max(f64::MIN_POSITIVE);
                 if share < FARTHEST {
@@ -71,6 +72,7 @@ impl RodInverse<'_> {
                     pairs.for_each(|(own, before)| *own += share * (*own - before));
                 }
             }
+            // Largest change of an unknown: 0.5 rad, and 50 times the tool's relative way with least tensions.
             let limit = if options.freedom == Freedom::None {
                 JUMP
             } else {
@@ -78,11 +80,12 @@ impl RodInverse<'_> {
             };
             let mut step = work.descend(&self.space, options, (&last, limit), &mut iterations);
             if step == StepOutcome::Jumped && options.freedom != Freedom::None {
-                // The branch of least tensions may end or turn away here: on without.
+                // The branch of least tensions may end or turn away here: the step stays near instead.
                 work.search.point.clone_from(&last);
                 let as_it_is = SearchOptions { freedom: Freedom::None, ..options };
                 step = work.descend(&self.space, as_it_is, (&last, JUMP), &mut iterations);
             }
+            // Twice the stride after a step that arrives, half of it after one that does not.
             if step == StepOutcome::Reached {
                 (done, stride) = (next, 2.0 * stride);
                 last.clone_from(&work.search.point);
@@ -100,7 +103,7 @@ impl RodInverse<'_> {
         }))
     }
 
-    /// From the row before, or from a few starts where that does not lead there.
+    /// Solves for the next row of a path from the row before, or from a few starts where that fails.
     pub(super) fn track(&self, target: &Target, work: &mut RodScratch<'_>) -> Answer {
         if let Some(from_rest) = &work.from_rest {
             from_rest.allow_slack(&mut work.problem);

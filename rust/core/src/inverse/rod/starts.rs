@@ -1,4 +1,4 @@
-//! Where searches begin.
+//! Starting tensions of a search.
 
 use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -38,7 +38,7 @@ impl RodInverse<'_> {
         }
     }
 
-    /// The tensions that bend the rod most nearly so, by its stiffness at rest.
+    /// Tensions that bend the rod most nearly so, by its stiffness at rest.
     pub(super) fn tensions_for_bends(&self, bends: &[Vector2<f64>], point: &mut Vec<f64>) {
         let turns: Vec<_> = bends.iter().map(|b| Vector3::new(-b.y, b.x, 0.0)).collect();
         let mut right = Vec::new();

@@ -1,4 +1,4 @@
-//! What the swarm lowers, in units of the trunk's length.
+//! Cost of a particle, in units of the trunk's length.
 
 use std::f64::consts::TAU;
 
@@ -15,7 +15,7 @@ fn wrap_angle(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// What a heading is off, as a length.
+/// Error of a heading, as a length.
 fn heading_miss(heading: Option<f64>, sum: f64) -> f64 {
     heading.map_or(0.0, |heading| HEADING_WEIGHT * wrap_angle(sum - heading))
 }
@@ -37,10 +37,10 @@ pub(super) fn tip_error(solver: &Solver<'_>, turns: &[f64]) -> f64 {
     off.norm_sqr().sqrt().hypot(heading_miss(solver.heading, sum))
 }
 
-/// Room left to the circles, so that what is clear here is so in metres, whatever the rounding.
+/// Margin to the circles, so that turns that are clear here are clear in metres, whatever the rounding.
 const SKIN: f64 = 1e-14;
 
-/// How deep the trunk reaches into the circles.
+/// Depth by which the trunk enters the circles.
 pub(super) fn depth(solver: &Solver<'_>, turns: &[f64], circles: &[Circle]) -> f64 {
     (SKIN - clearance(&solver.problem.lengths, turns, circles)).max(0.0)
 }
@@ -84,7 +84,7 @@ pub(super) struct Projection {
     pub(super) clear: bool,
 }
 
-/// Brings turns onto the target, in place, and weighs them.
+/// Brings turns onto the target, in place, and evaluates them.
 pub(super) fn project_onto_target(
     solver: &mut Solver<'_>,
     turns: &mut Vec<f64>,

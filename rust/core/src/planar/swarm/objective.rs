@@ -17,7 +17,7 @@ use crate::status::Status;
 const NEAR: f64 = 0.1;
 const NEARER: f64 = 0.5;
 
-/// What becomes of the swarm's points.
+/// Handover from the swarm to Newton's method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Handover {
     /// The best one is the answer.
@@ -144,7 +144,7 @@ impl<'s, 'a> SwarmObjective<'s, 'a> {
         }
     }
 
-    /// From values to what is told: metres, or energies in 1/m.
+    /// Scale of the values that the swarm reports: metres, or energies in 1/m.
     fn scale(&self) -> f64 {
         if self.handover == Handover::Constrain {
             1.0 / self.solver.total_length
@@ -153,7 +153,7 @@ impl<'s, 'a> SwarmObjective<'s, 'a> {
         }
     }
 
-    /// The value of a particle. Where its coordinates are not the turns, these are left in `turns`.
+    /// Value of a particle. Where its coordinates are not the turns, these are written to `turns`.
     fn value_of(&mut self, point: &[f64]) -> f64 {
         if self.unknowns == Unknowns::Points {
             return length_error(&self.solver, point, &mut self.turns);
@@ -242,7 +242,7 @@ impl<'s, 'a> SwarmObjective<'s, 'a> {
         self.answer = Some((solver.problem.energy(&turns), turns));
     }
 
-    /// Where all swarms missed the target: Newton's method from its own starts, the straight trunk, and
+    /// Newton's method after all swarms missed the target, from its own starts, the straight trunk, and
     /// the straight one turned towards the target by its first section. The watcher is asked between.
     pub(super) fn last_resort(&mut self) -> Result<(), Abandoned> {
         if self.handover != Handover::Polish || self.done || self.finish {
@@ -272,7 +272,7 @@ impl<'s, 'a> SwarmObjective<'s, 'a> {
         Ok(())
     }
 
-    /// Whether the watcher, told of the last move again, wants the best that there is by now.
+    /// Calls the watcher with the last move again; true when it wants the best answer so far.
     fn poll_watcher(&mut self) -> Result<bool, Abandoned> {
         let Some(last) = &self.last else { return Ok(false) };
         match (self.watch)(last) {
@@ -292,11 +292,13 @@ impl<'s, 'a> SwarmObjective<'s, 'a> {
         trunk: &Trunk,
         circles: &[Circle],
     ) -> SwarmInverse {
+        // Lowest points of the swarms, best first.
         let mut ends = std::mem::take(&mut self.ends);
         let swarms = ends.len();
         // A swarm that saw no value below infinity has no best.
         ends.retain(|end| !end.1.is_empty());
         ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // The answer on the target; else the nearest points from all ends; without polish the best end.
         if let Some((energy, turns)) = self.answer.take() {
             self.solver.best = Some((energy, self.done, turns));
         } else if self.handover == Handover::Polish {
@@ -311,6 +313,7 @@ impl<'s, 'a> SwarmObjective<'s, 'a> {
                 (0.0, true, turns)
             });
         }
+        // Status: Newton's, or that of the swarm's own point.
         let total_length = self.solver.total_length;
         let mut inverse = self.solver.into_inverse(self.polish_count);
         let clearance = trunk.clearance(&inverse.turns, circles);
@@ -332,7 +335,7 @@ impl<'s, 'a> SwarmObjective<'s, 'a> {
     }
 }
 
-/// How turns stand that Newton's method has not judged.
+/// Status of turns that Newton's method has not polished.
 fn status_of_swarm(inverse: &Inverse, clearance: f64, total_length: f64, tolerance: f64) -> Status {
     let miss = inverse.error.hypot(total_length * HEADING_WEIGHT * inverse.heading_error);
     match (miss <= tolerance, clearance >= 0.0) {

@@ -6,7 +6,7 @@ use crate::planar::chord::{Point, sinc};
 /// Bound of the derivative of sin(x)/x for any x.
 const SINC_SLOPE: f64 = 0.436_182;
 
-/// What the equation is at one turn of the first section.
+/// Scalar equation F at one turn of the first section.
 pub(super) struct Equation {
     /// Distance from the joint to the target.
     pub(super) distance: f64,
@@ -28,7 +28,7 @@ pub(super) struct EquationValue {
     pub(super) sinc_slope: f64,
 }
 
-/// What an interval may hold on one sheet of the angle.
+/// Number of roots that an interval may have on one sheet of the angle.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum RootCount {
     /// No root.
@@ -79,7 +79,7 @@ pub(super) struct Bounds {
     distance: [f64; 2],
     /// First, second and third derivative of the angle.
     angle: [f64; 3],
-    /// How far the angle goes from its middle value.
+    /// Largest change of the angle from its middle value.
     pub(super) sweep: f64,
 }
 
@@ -121,7 +121,7 @@ impl Bounds {
     }
 }
 
-/// What a bound on the second derivative says of an interval; values within `margin` of zero may be
+/// Root count of an interval by a bound on the second derivative; values within `margin` of zero may be
 /// zero.
 pub(super) fn count_roots(at: &EquationValue, bend: f64, half: f64, margin: f64) -> RootCount {
     let curved = 0.5 * bend * half * half;

@@ -15,7 +15,20 @@ use crate::error::{InvalidInput, length};
 use polish::Tip;
 use search::{CORNER, EDGE, SAME, Search};
 
-/// Two sections of given lengths, ready to be asked for any number of targets.
+/// Two sections of given lengths, ready for any number of targets.
+///
+/// ```
+/// use tdcr::planar::TwoSections;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let two = TwoSections::new(0.14, 0.12, std::f64::consts::TAU)?;
+/// let mut found = Vec::new();
+/// two.solutions(0.2, 0.06, &mut found);
+/// assert!(found.iter().all(|turns| (two.tip(*turns).y - 0.06).abs() < 1e-12));
+/// assert!(found.len() >= 2 && two.energy(found[0]) <= two.energy(found[1]));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoSections {
     lengths: [f64; 2],
@@ -57,7 +70,7 @@ impl TwoSections {
         self.search(x, y, found);
     }
 
-    /// As [`TwoSections::solutions`]; returns the number of intervals looked at.
+    /// Solutions as in [`TwoSections::solutions`]; returns the number of intervals examined.
     #[doc(hidden)]
     pub fn search(&self, x: f64, y: f64, found: &mut Vec<[f64; 2]>) -> usize {
         found.clear();

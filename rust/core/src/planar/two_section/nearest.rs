@@ -17,6 +17,7 @@ impl TwoSections {
     /// local minima of the distance that a grid of 41 x 41 turns leads to.
     #[must_use]
     pub fn nearest(&self, x: f64, y: f64) -> ([f64; 2], f64) {
+        // A target within reach: its solution of least bending energy.
         let mut found = Vec::new();
         self.solutions(x, y, &mut found);
         if let Some(&turns) = found.first() {
@@ -26,7 +27,7 @@ impl TwoSections {
         let ([l1, l2], limit) = (self.lengths(), self.limit());
         let whole = l1 + l2;
         let distance = x.hypot(y);
-        // Halves: the distance itself may overflow.
+        // A far target: another one in its direction. Halves, since the distance itself may overflow.
         if distance > FAR * whole {
             let half = (0.5 * x).hypot(0.5 * y);
             let part = |c: f64| 0.5 * c / half * FAR * whole;
@@ -34,6 +35,7 @@ impl TwoSections {
             let tip = self.tip(turns);
             return (turns, (tip.x - x).hypot(tip.y - y));
         }
+        // Else Newton's method from the local minima of the distance on the grid.
         let problem = TipEquations {
             lengths: vec![l1 / whole, l2 / whole],
             limits: vec![limit; 2],
@@ -46,6 +48,7 @@ impl TwoSections {
             let tip = self.tip([turn(i / GRID), turn(i % GRID)]);
             distances.push((tip.x - x).hypot(tip.y - y));
         }
+        // The best of the minima that these lead to.
         let mut best = ([0.0; 2], f64::INFINITY);
         let mut work = Scratch::default();
         for start in minima(&distances) {

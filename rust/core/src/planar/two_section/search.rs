@@ -32,7 +32,7 @@ pub(super) const SAME: f64 = 1e-8;
 /// Steps of a safeguarded Newton iteration; halving alone would end it.
 const STEPS: usize = 60;
 
-/// Intervals looked at before halving ends whatever is left: a guard, far above what any target of the
+/// Intervals examined before halving stops: a guard, far above what any target of the
 /// tests takes.
 const MOST: usize = 100_000;
 
@@ -64,7 +64,7 @@ pub(super) struct Search<'a> {
     pub(super) target: Point,
     /// The turns found, in the order of the first.
     pub(super) found: &'a mut Vec<[f64; 2]>,
-    /// Equations looked at, for the record.
+    /// Intervals examined so far.
     pub(super) interval_count: usize,
 }
 
@@ -170,7 +170,7 @@ impl Search<'_> {
         }
     }
 
-    /// The same by Newton's method between brackets.
+    /// Root of a monotone interval by Newton's method between brackets.
     fn bracket(&mut self, middle: f64, half: f64, reference: f64, value: &EquationValue) {
         let (mut low, mut high) = (middle - half, middle + half);
         let mut turn = (middle - value.value / value.slope).clamp(low, high);

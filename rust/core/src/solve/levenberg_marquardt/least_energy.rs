@@ -64,6 +64,7 @@ impl<const R: usize> Scratch<R> {
         max_iterations: usize,
         scratch: &mut LeastEnergy,
     ) -> Ending {
+        // E and its gradient g at a point with r = 0; λ = 0 to begin with.
         scratch.gradient.resize(region.size(), 0.0);
         scratch.next_gradient.resize(region.size(), 0.0);
         scratch.energy = problem.energy(z, &mut scratch.gradient);
@@ -72,6 +73,7 @@ impl<const R: usize> Scratch<R> {
         self.program.active.clear();
         problem.evaluate(z, &mut self.residual, &mut self.jacobian);
         for _ in 0..max_iterations {
+            // Quadratic model of the Lagrangian E + λ·r under the linearised target and region.
             self.iterations += 1;
             match self.solve_energy_model(
                 problem,
@@ -86,19 +88,22 @@ impl<const R: usize> Scratch<R> {
                 Outcome::Infeasible if problem.is_met(&self.residual) => return Ending::Met,
                 Outcome::Infeasible | Outcome::Failed => return Ending::Failed,
             }
+            // λ of the target: the multipliers of the first R rows.
             multipliers.fill(0.0);
             for (&row, multiplier) in self.program.active.iter().zip(&self.program.multipliers) {
                 if row < R {
                     multipliers[row] = *multiplier;
                 }
             }
-            // Strong multipliers carry the rounding of what they multiply.
+            // A minimum has no gradient of the Lagrangian left. Strong multipliers carry the rounding of what they
+            // multiply.
             let strongest =
                 self.program.multipliers.iter().fold(1.0_f64, |most, m| most.max(m.abs()));
             let known = STATIONARY.max(problem.precision());
             if self.program.lagrangian_gradient(&self.rows) <= known * strongest {
                 return Ending::Met;
             }
+            // A shorter step along the target, or more damping where none lowers E.
             if self.line_search(problem, region, z, &multipliers, ROUNDING * strongest, scratch) {
                 damping = if damping < DAMPING.0 { 0.0 } else { 0.6 * damping };
             } else {
@@ -134,12 +139,14 @@ impl<const R: usize> Scratch<R> {
         let lagrangian = *energy + multipliers.dot(&self.residual);
         let mut lower = None;
         for _ in 0..BACKTRACKS {
+            // A share of the step, brought back into the region and onto the target.
             next.clear();
             next.extend(z.iter().zip(step).map(|(z, p)| z + share * p));
             let wanted = ARMIJO * share * dot(gradient, step).abs();
             if region.restore(next, &mut self.restoring)
                 && self.descend(problem, region, next, Purpose::Meet, CORRECTIONS) == Ending::Met
             {
+                // Armijo's condition on E + λ·r.
                 let reached = problem.energy(next, next_gradient);
                 if reached + multipliers.dot(&self.residual) <= lagrangian - wanted + rounding {
                     lower = Some(reached);
@@ -168,12 +175,14 @@ impl<const R: usize> Scratch<R> {
         multipliers: &SVector<f64, R>,
         damping: &mut f64,
     ) -> Outcome {
+        // Hessian of the Lagrangian: of E, of λ·r, of the active discs.
         let size = region.size();
         self.hessian.clear();
         self.hessian.resize(size * size, 0.0);
         problem.add_energy_hessian(z, &mut self.hessian);
         problem.add_hessian(z, multipliers, &mut self.hessian);
         region.add_curvature(z, &self.program, R, &mut self.hessian);
+        // Rows: J p = −r of the target, then those of the region and of the problem's bounds.
         self.rows.clear();
         for row in 0..R {
             let normal = self.rows.push(size, -self.residual[row]);
@@ -183,6 +192,7 @@ impl<const R: usize> Scratch<R> {
         region.linearize(z, &mut self.rows);
         problem.linearize(&mut self.rows);
         self.penalize_rows(size, R);
+        // Damping until the model is positive definite across these rows.
         let mut added = 0.0;
         loop {
             let shift = damping.max(FLOOR);

@@ -17,6 +17,42 @@ use crate::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
 use least_energy::LeastEnergy;
 
 /// Residuals of `R` rows, and an energy that chooses among the points where they vanish.
+///
+/// ```
+/// use nalgebra::Vector1;
+/// use tdcr::solve::convex_region::Region;
+/// use tdcr::solve::levenberg_marquardt::{Ending, Problem, Purpose, Scratch};
+///
+/// /// The circle of radius 1, and the energy z_0 on it.
+/// struct Circle;
+///
+/// impl Problem<1> for Circle {
+///     fn evaluate(&mut self, z: &[f64], r: &mut Vector1<f64>, jacobian: &mut [Vector1<f64>]) {
+///         r[0] = z[0] * z[0] + z[1] * z[1] - 1.0;
+///         jacobian.iter_mut().zip(z).for_each(|(column, z)| column[0] = 2.0 * z);
+///     }
+///     fn squared_norm(&mut self, z: &[f64]) -> f64 {
+///         (z[0] * z[0] + z[1] * z[1] - 1.0).powi(2)
+///     }
+///     fn is_met(&self, r: &Vector1<f64>) -> bool {
+///         r[0].abs() < 1e-12
+///     }
+///     fn add_hessian(&mut self, _: &[f64], weights: &Vector1<f64>, hessian: &mut [f64]) {
+///         hessian[0] += 2.0 * weights[0];
+///         hessian[3] += 2.0 * weights[0];
+///     }
+///     fn energy(&self, z: &[f64], gradient: &mut [f64]) -> f64 {
+///         gradient.copy_from_slice(&[1.0, 0.0]);
+///         z[0]
+///     }
+///     fn add_energy_hessian(&self, _: &[f64], _: &mut [f64]) {}
+/// }
+///
+/// let (mut scratch, region, mut z) = (Scratch::<1>::default(), Region::new(2), vec![2.0, 1.0]);
+/// let ending = scratch.descend(&mut Circle, &region, &mut z, Purpose::Meet, 50);
+/// assert_eq!(ending, Ending::Met);
+/// assert!((z[0].hypot(z[1]) - 1.0).abs() < 1e-12);
+/// ```
 pub trait Problem<const R: usize> {
     /// Residuals, and their derivatives by every unknown.
     fn evaluate(
@@ -29,27 +65,27 @@ pub trait Problem<const R: usize> {
     /// The squared residuals alone.
     fn squared_norm(&mut self, z: &[f64]) -> f64;
 
-    /// Whether residuals are as small as wanted.
+    /// True when residuals are within the tolerances.
     fn is_met(&self, residual: &SVector<f64, R>) -> bool;
 
     /// Adds the second derivatives of `weights . r` to the lower triangle of a matrix, row by row, at `z`,
     /// the point evaluated last.
     fn add_hessian(&mut self, z: &[f64], weights: &SVector<f64, R>, hessian: &mut [f64]);
 
-    /// Forgets where it was, for problems whose values depend on that: what follows begins anew.
+    /// Resets a problem whose values depend on the points before.
     fn restart(&mut self) {}
 
-    /// Keeps where it is, for [`Self::restore_state`].
+    /// Saves the state of the point evaluated last, for [`Self::restore_state`].
     fn save_state(&mut self) {}
 
-    /// Back to where it was kept.
+    /// Restores the saved state.
     fn restore_state(&mut self) {}
 
     /// Adds bounds on functions of the unknowns, as rows for a step from the point evaluated last; there are
     /// none unless this is defined.
     fn linearize(&self, _rows: &mut Rows) {}
 
-    /// Whether there are any.
+    /// True when there are bounds on functions of the unknowns.
     fn has_bounds(&self) -> bool {
         false
     }
@@ -72,9 +108,16 @@ pub trait Problem<const R: usize> {
 }
 
 /// Why an iteration ended.
+///
+/// ```
+/// use tdcr::solve::levenberg_marquardt::Ending;
+///
+/// let retry = |ending| matches!(ending, Ending::Stalled | Ending::IterationLimit);
+/// assert!(retry(Ending::Stalled) && !retry(Ending::Met));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// The residuals are as small as wanted.
+    /// The residuals are within the tolerances.
     Met,
     /// At, or on the way to, a minimum that does not meet them.
     Stalled,
@@ -84,7 +127,14 @@ pub enum Ending {
     Failed,
 }
 
-/// What a descent is for.
+/// Purpose of a descent.
+///
+/// ```
+/// use tdcr::solve::levenberg_marquardt::Purpose;
+///
+/// let purpose = |last_start: bool| if last_start { Purpose::Nearest } else { Purpose::Meet };
+/// assert_eq!(purpose(true), Purpose::Nearest);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// To meet the residuals, or to give up early so that another start gets its turn.
@@ -99,7 +149,7 @@ const STEP: f64 = 1.0;
 const DAMPING: f64 = 0.1;
 /// Damping at least, as a share of the trace: rounding in a singular matrix is below it.
 const FLOOR: f64 = 1e-13;
-/// Damping beyond which no step is left.
+/// Damping beyond which steps vanish.
 const STUCK: f64 = 1e12;
 /// A step that lowers the squared residual by less than this share makes no headway...
 const HEADWAY: f64 = 1e-3;
@@ -119,6 +169,17 @@ const STATIONARY: f64 = 1e-11;
 const ROUNDING: f64 = 1e-15;
 
 /// Buffers, reused from one descent to the next.
+///
+/// ```
+/// use tdcr::solve::convex_region::Region;
+/// use tdcr::solve::levenberg_marquardt::Scratch;
+///
+/// let mut region = Region::new(2);
+/// region.add_bound(&[1.0, 0.0], 1.0);
+/// let (mut scratch, mut start) = (Scratch::<6>::default(), [3.0, 0.0]);
+/// assert!(scratch.restore(&region, &mut start));
+/// assert!(region.contains(&start));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scratch<const R: usize> {
     /// Steps taken so far, for the caller to reset.
@@ -132,10 +193,10 @@ pub struct Scratch<const R: usize> {
     pub(super) trial: Vec<f64>,
     trial_residual: SVector<f64, R>,
     trial_jacobian: Vec<SVector<f64, R>>,
-    /// Of the programs that bring points back: the active rows of the last model are still needed.
+    /// Buffers of the programs that bring points back: the active rows of the last model are still needed.
     pub(super) restoring: RestoreScratch,
     least_energy: LeastEnergy,
-    /// Rows along which no step is wanted, orthonormal.
+    /// Orthonormal basis of the rows across which steps are to stay.
     basis: Vec<f64>,
 }
 
@@ -179,6 +240,7 @@ impl<const R: usize> Scratch<R> {
         purpose: Purpose,
         max_iterations: usize,
     ) -> Ending {
+        // r and J at the start, brought inside the problem's own bounds.
         self.trial_jacobian.resize(region.size(), SVector::zeros());
         self.evaluate(problem, z);
         if problem.violation() > WITHIN {
@@ -199,6 +261,7 @@ impl<const R: usize> Scratch<R> {
             if !squared.is_finite() {
                 return Ending::Failed;
             }
+            // Step p of the damped model, ½|r + J p|² + ½ μ|p|² under the region's rows.
             self.iterations += 1;
             if !self.solve_model(problem, region, z, purpose, &mut damping) {
                 return Ending::Failed;
@@ -206,6 +269,7 @@ impl<const R: usize> Scratch<R> {
             if purpose == Purpose::Nearest && self.stationary(squared, problem.precision()) {
                 return Ending::Stalled;
             }
+            // A step that lowers |r|² is taken and lowers μ; another one raises μ.
             let lower = self.try_step(problem, region, z, squared);
             if let Some(lower) = lower {
                 idle = if lower > (1.0 - HEADWAY) * squared { idle + 1 } else { 0 };
@@ -218,6 +282,7 @@ impl<const R: usize> Scratch<R> {
                     self.evaluate(problem, z);
                 }
             }
+            // Without headway the next start gets its turn.
             let stuck = damping > STUCK || (purpose == Purpose::Meet && idle > PATIENCE);
             if stuck {
                 return Ending::Stalled;
@@ -236,6 +301,7 @@ impl<const R: usize> Scratch<R> {
         purpose: Purpose,
         damping: &mut f64,
     ) -> bool {
+        // JᵀJ and Jᵀr; the nearest point needs the second derivatives of r and of the discs too.
         let size = region.size();
         self.gauss_newton(size);
         let trace: f64 = (0..size).map(|i| self.hessian[i * (size + 1)]).sum();
@@ -247,6 +313,7 @@ impl<const R: usize> Scratch<R> {
             problem.linearize(&mut self.rows);
             self.penalize_rows(size, 0);
         }
+        // Damping μ in proportion to |r|², raised until the matrix is positive definite.
         let squared = self.residual.norm_squared();
         let mut added = 0.0;
         loop {
@@ -263,6 +330,7 @@ impl<const R: usize> Scratch<R> {
                 return false;
             }
         }
+        // The free minimum, where the region and the bounds allow it.
         self.program.solve_free();
         self.trial.clear();
         self.trial.extend(z.iter().zip(&self.program.step).map(|(z, p)| z + p));
@@ -271,6 +339,7 @@ impl<const R: usize> Scratch<R> {
         if inside && !problem.has_bounds() {
             return true;
         }
+        // Else the minimum under the linearised constraints.
         self.rows.clear();
         region.linearize(z, &mut self.rows);
         problem.linearize(&mut self.rows);
@@ -330,7 +399,7 @@ impl<const R: usize> Scratch<R> {
         }
     }
 
-    /// Whether the gradient of the Lagrangian vanishes.
+    /// True when the gradient of the Lagrangian vanishes.
     fn stationary(&self, squared: f64, precision: f64) -> bool {
         let steepest = self.jacobian.iter().fold(0.0_f64, |most, column| most.max(column.norm()));
         let left = self.program.lagrangian_gradient(&self.rows);

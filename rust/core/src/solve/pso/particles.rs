@@ -13,7 +13,7 @@ use super::settings::{Bounds, PsoSettings, Sampling};
 pub(super) struct Particles {
     pub(super) positions: Vec<f64>,
     velocities: Vec<f64>,
-    /// Where each particle was best.
+    /// Best point p of each particle.
     pub(super) own: Vec<f64>,
     /// The best point of each particle's leader.
     leader_best: Vec<f64>,
@@ -26,7 +26,7 @@ pub(super) struct Particles {
     dimensions: usize,
 }
 
-/// How a particle moves, without what the swarm is otherwise.
+/// Coefficients of a particle's move.
 #[derive(Clone, Copy)]
 struct Coefficients {
     inertia: f64,
@@ -56,7 +56,7 @@ impl Particles {
         self.direction.resize(n.next_multiple_of(2), 0.0);
     }
 
-    /// Places uniform in the box, velocities to places uniform in it.
+    /// Positions uniform in the box, velocities to positions uniform in it.
     pub(super) fn initialize(&mut self, draws: &[u64]) {
         for e in 0..self.positions.len() {
             let (at, to) = uniform_pair(draws[e]);
@@ -69,17 +69,17 @@ impl Particles {
         }
     }
 
-    /// Whether a number is inside the box, as coordinate `e` of the swarm.
+    /// True when a number is inside the box, as coordinate `e` of the swarm.
     pub(super) fn contains(&self, e: usize, x: f64) -> bool {
         (self.lower[e]..=self.upper[e]).contains(&x)
     }
 
-    /// Puts given points in the place of the first particles'.
+    /// Sets the positions of the first particles.
     pub(super) fn set_positions(&mut self, points: &[f64]) {
         self.positions[..points.len()].copy_from_slice(points);
     }
 
-    /// Hands every particle the best point of its leader.
+    /// Copies the best point g of its leader to every particle.
     pub(super) fn update_leaders(&mut self, leaders: &[usize]) {
         let n = self.dimensions;
         for (row, &leader) in self.leader_best.chunks_exact_mut(n).zip(leaders) {
@@ -90,7 +90,7 @@ impl Particles {
         }
     }
 
-    /// Where a particle is becomes its best point.
+    /// Stores a particle's position as its best point.
     pub(super) fn store_best(&mut self, particle: usize) {
         let row = particle * self.dimensions..(particle + 1) * self.dimensions;
         for e in row {
@@ -168,6 +168,7 @@ impl Particles {
         let n = self.dimensions;
         for (particle, &leader) in leaders.iter().enumerate() {
             let row = particle * n..(particle + 1) * n;
+            // Weights of p - x and l - x in G - x.
             let (own, social) = if leader == particle {
                 (coefficients.cognitive / 2.0, 0.0)
             } else {
@@ -180,10 +181,12 @@ impl Particles {
                 .map(|e| attraction(self.positions[e], self.own[e], self.leader_best[e]).powi(2))
                 .sum::<f64>()
                 .sqrt();
+            // Direction d of length one and share u of the radius |G - x|.
             let length = direction(&draws[row.clone()], &mut self.direction);
             // In one dimension only the sign of the direction counts, which is the other half.
             let (share, _) = uniform_pair(draws[row.end - 1]);
             let distance = if length > 0.0 { share * radius / length } else { 0.0 };
+            // x' - x = G - x + u |G - x| d.
             for (e, along) in row.zip(&self.direction) {
                 let place = self.positions[e];
                 let velocity = coefficients.inertia * self.velocities[e]

@@ -37,7 +37,7 @@ pub struct Swarm {
     run: Run,
 }
 
-/// What a run counts.
+/// Counters of a run.
 #[derive(Clone, Copy, Debug, Default)]
 struct Run {
     /// The particle with the lowest value so far.
@@ -45,7 +45,7 @@ struct Run {
     iterations: usize,
     evaluations: usize,
     nan_count: usize,
-    /// Whether the last iteration changed any particle's best point, and lowered the best of all.
+    /// Flags of the last iteration: any particle's best point changed, the best of all fell.
     learned: bool,
     better: bool,
     /// The best value at the last progress, and the iterations since.
@@ -174,7 +174,7 @@ impl Swarm {
         &self.history
     }
 
-    /// The particles' places after the last run, in rows.
+    /// Positions of the particles after the last run, in rows.
     #[must_use]
     pub fn places(&self) -> &[f64] {
         &self.particles.positions
@@ -190,7 +190,7 @@ impl Swarm {
         self.particles.set_positions(&self.starts);
     }
 
-    /// Values of all places, and what the particles remember of them.
+    /// Evaluates all positions and updates the particles' best points.
     fn evaluate<O: Objective>(&mut self, objective: &mut O) -> Result<(), O::Error> {
         // An objective that leaves a value out has not found one there.
         self.values.fill(f64::NAN);

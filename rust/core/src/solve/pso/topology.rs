@@ -1,4 +1,4 @@
-//! Who leads whom.
+//! Leaders of the particles.
 
 use super::random::RandomIntegers;
 use super::settings::{PsoSettings, Topology};
@@ -13,7 +13,7 @@ pub(super) struct Leaders {
     integers: RandomIntegers,
 }
 
-/// How many links a swarm draws.
+/// Number of links that a swarm draws.
 pub(super) fn links(settings: &PsoSettings) -> usize {
     match settings.topology {
         Topology::Random => settings.neighbours.saturating_mul(settings.particles),
@@ -39,7 +39,7 @@ impl Leaders {
         self.integers = RandomIntegers::new(seed);
     }
 
-    /// Whether links are drawn, not given.
+    /// True when links are drawn, not given.
     pub(super) fn is_random(&self) -> bool {
         !self.informants_of.is_empty()
     }

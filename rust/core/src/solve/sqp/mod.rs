@@ -15,11 +15,18 @@ use nalgebra::{SMatrix, SVector};
 use null_space::{Frame, Step};
 pub use problem::{Linearization, Problem};
 
-/// How long and how precisely to iterate.
+/// Settings of the iteration: tolerances, bounds, budget.
+///
+/// ```
+/// use tdcr::linkage::LinkageSettings;
+///
+/// let settings = LinkageSettings::default().sqp();
+/// assert!(settings.constraint_tolerance < settings.step_tolerance);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The iteration ends with the first full Newton step below this; that step is still taken, so
-    /// the error left is about its square.
+    /// the remaining error is about its square.
     pub step_tolerance: f64,
     /// No step is longer: trial points stay where the quadratic model means something.
     pub step_bound: f64,
@@ -30,6 +37,17 @@ pub struct Settings {
 }
 
 /// Why the iteration ended.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::linkage::seven_bar::Hole;
+/// use tdcr::linkage::{LinkageSettings, solve_four_bar};
+/// use tdcr::solve::sqp::Ending;
+///
+/// let hole = Vector3::new(0.5, 0.0, 0.0);
+/// let settings = LinkageSettings::default().sqp();
+/// assert_eq!(solve_four_bar(&Hole::new(hole, hole, 0.1), &settings).ending, Ending::Converged);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// The Newton step fell below the tolerance with the constraints met.
@@ -43,6 +61,13 @@ pub enum Ending {
 }
 
 /// The last point and how it was reached.
+///
+/// ```
+/// use tdcr::solve::sqp::{Ending, Solution};
+///
+/// let solution = Solution::<f64, 1>::without_iterations(0.5);
+/// assert_eq!((solution.ending, solution.iterations), (Ending::Converged, 0));
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Solution<P, const M: usize> {
     /// The last point, solution or not.
@@ -115,7 +140,7 @@ impl<P: Copy, const N: usize, const M: usize> Iterate<P, N, M> {
     }
 }
 
-/// Minimises `problem` from `start`. Where the iteration fails with the constraints unmet, it looks
+/// Minimises `problem` from `start`. Where the iteration fails with the constraints unmet, it searches
 /// for a feasible point, and starts again from there or says that there is none nearby.
 pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
     problem: &P,
@@ -148,6 +173,7 @@ fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
     let (mut one, mut other) = (Iterate::new(start), Iterate::new(start));
     // References, so that taking turns moves no data.
     let (mut here, mut there) = (&mut one, &mut other);
+    // f, c and their gradients at the start; null-space basis and least-squares multipliers (eq. 18.21).
     problem.linearize(&here.point, &mut here.at);
     let mut penalty = INITIAL_PENALTY;
     let mut ending = Ending::IterationLimit;
@@ -155,6 +181,7 @@ fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
     let mut frame = Frame::new();
     frame.adapt(&here.at);
     while iterations < settings.max_iterations {
+        // Step of the quadratic model (algorithm 16.2).
         let hessian = problem.hessian(&here.point, &frame.multipliers);
         let Some(step) = frame.newton_step(&here.at, hessian) else {
             ending = Ending::NumericalError;
@@ -162,6 +189,7 @@ fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
         };
         iterations += 1;
         let size = problem.step_size(&step.full);
+        // A full Newton step below the tolerance is the last; others are searched along.
         let last = step.exact && size <= settings.step_tolerance;
         let moved = if last {
             there.move_to(problem, here, &step.full, 1.0);
@@ -173,6 +201,7 @@ fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
         if !moved {
             break;
         }
+        // The new point, with its own basis and multipliers.
         std::mem::swap(&mut here, &mut there);
         frame.adapt(&here.at);
         if last && here.at.constraints.amax() <= settings.constraint_tolerance {
