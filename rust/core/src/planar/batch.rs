@@ -20,7 +20,8 @@ use crate::error::InvalidInput;
 /// # fn main() -> Result<(), tdcr::InvalidInput> {
 /// let two = TwoSections::new(0.14, 0.12, std::f64::consts::TAU)?;
 /// let targets = [[0.2, 0.06], [1.0, 0.0]];
-/// let rows = solution_rows(&two, &targets, &pool(Some(1))?, &Control::default()).unwrap_or_default();
+/// let threads = pool(Some(1))?;
+/// let rows = solution_rows(&two, &targets, &threads, &Control::default()).unwrap_or_default();
 /// // The second target is out of reach.
 /// assert_eq!((rows.counts[0], rows.counts[1]), (rows.turns.len(), 0));
 /// # Ok(())

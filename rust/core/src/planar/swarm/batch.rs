@@ -22,7 +22,8 @@ use crate::error::InvalidInput;
 /// let solver = SwarmSolver::new(&trunk, &[], &SwarmSettings::default())?;
 /// let goal = Goal { point: Vector2::new(0.2, 0.06), heading: None, limits: vec![3.0] };
 /// let rows = [0, 1].map(|seed| Row { goal: goal.clone(), seed });
-/// let found = solve_rows(&solver, &rows, &pool(Some(1))?, &Control::default())?;
+/// let threads = pool(Some(1))?;
+/// let found = solve_rows(&solver, &rows, &threads, &Control::default())?;
 /// assert_eq!(found.map(|found| found.len()), Some(2));
 /// # Ok(())
 /// # }
