@@ -12,7 +12,7 @@ use tdcr::InvalidInput;
 use tdcr::batch::chained_shape;
 use tdcr::model::{Model, State};
 use tdcr::robot::Robot;
-use tdcr::rod::{self, Plan, Rod, Scratch, Subsegment, TendonRule};
+use tdcr::rod::{self, Plan, Rod, Scratch, Subsegment, TendonLaw};
 
 use crate::convert::arguments::whole;
 use crate::convert::arrays::{called, float_array, invalid, type_name, values, wrong_shape};
@@ -90,7 +90,7 @@ impl RodSettings {
         body_radius: f64,
     ) -> PyResult<Self> {
         let subsegment = named("subsegment", Subsegment::ALL, Subsegment::as_str, subsegment)?;
-        let tendons = named("tendons", TendonRule::ALL, TendonRule::as_str, tendons)?;
+        let tendons = named("tendons", TendonLaw::ALL, TendonLaw::as_str, tendons)?;
         // Adding 0.0 turns -0.0, which is equal to it, into 0.0.
         let body_radius = body_radius + 0.0;
         let settings = rod::RodSettings {
