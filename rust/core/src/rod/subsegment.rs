@@ -9,7 +9,7 @@ use super::elasticity::Elasticity;
 use super::element::Element;
 use super::settings::Subsegment;
 use crate::lie::Pose;
-use crate::solve::quadratic_program::{backward, dot, forward};
+use crate::solve::dense::{backward, dot, forward};
 
 /// A tendon between two disks: its holes in the frames of the base disk and of the next one.
 #[derive(Clone, Copy, Debug)]
