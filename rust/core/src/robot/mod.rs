@@ -1,13 +1,18 @@
-//! What a robot is: checked once, immutable, its holes resolved.
+//! Robots: checked once, immutable, their holes resolved.
 
 mod backbone;
 mod curve;
+mod derived;
 mod tendon;
+
+use std::any::Any;
+use std::sync::Arc;
 
 use nalgebra::{Matrix4, Vector3};
 
 pub use backbone::{Backbone, BackboneSpec};
 pub(crate) use curve::Spline;
+use derived::Derived;
 pub use tendon::{PerDisk, Routing, Tendon};
 
 use crate::error::{self, InvalidInput};
@@ -15,6 +20,20 @@ use crate::hashing::{Bits, hash_by_bits};
 use crate::lie::{Pose, so3};
 
 /// A tendon as the robot sees it: where it ends and which hole it passes on each disk.
+///
+/// ```
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let path = &robot.paths()[0];
+/// assert_eq!(path.end(), 10);
+/// assert!((path.length(&robot.rest_frames()) - 0.2).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Path {
     /// Azimuth of the hole on each disk 0..end \[rad\].
@@ -52,6 +71,19 @@ impl Path {
 }
 
 /// A backbone with tendons, placed in the world.
+///
+/// ```
+/// use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// let tendons = vec![Tendon::straight(0.0, 0.01)?, Tendon::straight(2.0, 0.01)?];
+/// let robot = Robot::new(backbone, tendons, None, None, Some("finger".to_owned()))?;
+/// assert_eq!(robot.tendon_names(), ["t0", "t1"]);
+/// assert_eq!(robot.rest_frames().len(), 11);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Robot {
     backbone: Backbone,
@@ -61,6 +93,7 @@ pub struct Robot {
     name: Option<String>,
     tendon_names: Vec<String>,
     paths: Vec<Path>,
+    derived: Derived,
 }
 
 impl Robot {
@@ -90,10 +123,11 @@ impl Robot {
                 resolve(tendon, &backbone, &rest).map_err(|e| e.within(&format!("tendons[{k}]")))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { backbone, tendons, base, tool, name, tendon_names, paths })
+        let derived = Derived::default();
+        Ok(Self { backbone, tendons, base, tool, name, tendon_names, paths, derived })
     }
 
-    /// The same robot with another backbone.
+    /// Copy of the robot with another backbone.
     ///
     /// # Errors
     /// As [`Robot::new`], where the tendons do not fit it.
@@ -102,7 +136,7 @@ impl Robot {
         Ok(Self { base: self.base, tool: self.tool, ..new })
     }
 
-    /// The same robot with other tendons.
+    /// Copy of the robot with other tendons.
     ///
     /// # Errors
     /// As [`Robot::new`], where they do not fit it.
@@ -151,6 +185,11 @@ impl Robot {
     #[must_use]
     pub fn name(&self) -> Option<&str> {
         self.name.as_deref()
+    }
+
+    /// Value that a higher room derives from this robot, made from its default on first use and kept with it.
+    pub(crate) fn derived<T: Any + Default + Send + Sync>(&self) -> Arc<T> {
+        self.derived.get()
     }
 
     /// Disk frames at rest, in the world; subsegments are arcs of constant strain.
