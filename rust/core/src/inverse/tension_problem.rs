@@ -93,7 +93,7 @@ impl<'a, G> Pull<'a, G> {
         if !(self.sound && wanted.clone().eq(self.tensions.iter().copied())) {
             self.tensions.clear();
             self.tensions.extend(wanted);
-            self.sound = self.rod.go(&self.tensions);
+            self.sound = self.rod.solve_at(&self.tensions);
             if self.sound {
                 self.rod.differentiate();
             }
@@ -180,16 +180,16 @@ impl<const R: usize, G: Goal<R>> Problem<R> for Pull<'_, G> {
     }
 
     fn restart(&mut self) {
-        self.rod.rest();
+        self.rod.reset();
         self.forget();
     }
 
     fn keep(&mut self) {
-        self.rod.keep(NEAREST);
+        self.rod.save(NEAREST);
     }
 
     fn go_back(&mut self) {
-        self.rod.go_back(NEAREST);
+        self.rod.restore(NEAREST);
         self.forget();
     }
 
@@ -341,7 +341,7 @@ mod tests {
             // Shapes are balanced to 5e-11 rad.
             check(pull, &z, f64::INFINITY, (1e-3, 3e-6));
             let tensions: Vec<f64> = z.iter().zip(pull.units).map(|(z, unit)| z * unit).collect();
-            assert!(pull.rod.go(&tensions));
+            assert!(pull.rod.solve_at(&tensions));
             let contacts = pull.rod.state().unwrap().contacts;
             assert!(contacts.iter().any(|c| c.force.norm() > 0.0));
         }

@@ -91,8 +91,8 @@ impl RodInverse<'_> {
         let lengths = self.rest.rest_lengths();
         let mut pull = Pull::new(self.balance(stop), goal, lengths, &self.units, &self.ranges);
         let mut search = Search::<R> { stop, ..Search::default() };
-        pull.rod.rest();
-        let given = start.is_some_and(|state| pull.rod.begin(state));
+        pull.rod.reset();
+        let given = start.is_some_and(|state| pull.rod.start_from(state));
         let first: Vec<f64> = if given { self.unknowns(pull.rod.tensions()) } else { Vec::new() };
         let before = usize::from(given);
         let begin = |k: usize, point: &mut Vec<f64>| match k.checked_sub(before) {

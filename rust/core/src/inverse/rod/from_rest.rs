@@ -60,12 +60,12 @@ impl<'a> Rise<'a> {
         if first.status != Status::Converged {
             return first;
         }
-        pull.rod.keep(FIRST);
+        pull.rod.save(FIRST);
         let mut first_point = search.point.clone();
         let (mut found, mut iterations, mut starts) = (first, first.iterations, first.starts);
         for tried in 1..=TRIES {
             let point = search.point.clone();
-            pull.rod.keep(MET);
+            pull.rod.save(MET);
             if effort.freedom != Freedom::None {
                 let lower = Effort { starts: 1, fall_back: false, nearest: false, ..effort };
                 let lower = search.run(pull, space, lower, |_, _| {});
@@ -75,7 +75,7 @@ impl<'a> Rise<'a> {
                         return Found { iterations, starts, ..found };
                     }
                     if tried == 1 {
-                        pull.rod.keep(FIRST);
+                        pull.rod.save(FIRST);
                         first_point.clone_from(&search.point);
                     }
                 }
@@ -155,7 +155,7 @@ fn back<const R: usize, G: Goal<R>>(
     point: &[f64],
 ) {
     pull.forget();
-    pull.rod.go_back(place);
+    pull.rod.restore(place);
     search.point.clear();
     search.point.extend_from_slice(point);
     search.fit.evaluate(pull, point);

@@ -103,7 +103,7 @@ impl<'a> RodInverse<'a> {
         let rest = FreeRod::new(Rod::new(robot, plan));
         let length = robot.backbone().total_length();
         let count = robot.tendons().len();
-        let lever = |k: usize| rest.softness(k).sqrt().max(LEVER * length);
+        let lever = |k: usize| rest.shortening(k).sqrt().max(LEVER * length);
         let units: Vec<f64> = (0..count).map(|k| 1.0 / lever(k)).collect();
         let mut inverse = Self {
             robot,
@@ -312,9 +312,9 @@ impl Inverter for RodInverse<'_> {
         self.watched(work, |work| {
             work.pull.forget();
             let given = if let Some(state) = start {
-                work.pull.rod.begin(state)
+                work.pull.rod.start_from(state)
             } else {
-                work.pull.rod.rest();
+                work.pull.rod.reset();
                 false
             };
             self.search(target, given, self.effort(self.settings.starts), work)
