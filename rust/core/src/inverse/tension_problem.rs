@@ -74,7 +74,7 @@ impl<'a, G> TensionProblem<'a, G> {
         if !(self.balanced && wanted.clone().eq(self.tensions.iter().copied())) {
             self.tensions.clear();
             self.tensions.extend(wanted);
-            self.balanced = self.rod.go(&self.tensions);
+            self.balanced = self.rod.solve_at(&self.tensions);
             if self.balanced {
                 self.rod.differentiate();
             }
@@ -161,16 +161,16 @@ impl<const R: usize, G: Goal<R>> Problem<R> for TensionProblem<'_, G> {
     }
 
     fn restart(&mut self) {
-        self.rod.rest();
+        self.rod.reset();
         self.forget();
     }
 
     fn save_state(&mut self) {
-        self.rod.keep(NEAREST);
+        self.rod.save(NEAREST);
     }
 
     fn restore_state(&mut self) {
-        self.rod.go_back(NEAREST);
+        self.rod.restore(NEAREST);
         self.forget();
     }
 
@@ -345,7 +345,7 @@ mod tests {
             check(problem, &z, f64::INFINITY, (1e-3, 3e-6));
             let tensions: Vec<f64> =
                 z.iter().zip(problem.units).map(|(z, unit)| z * unit).collect();
-            assert!(problem.rod.go(&tensions));
+            assert!(problem.rod.solve_at(&tensions));
             let contacts = problem.rod.state().unwrap().contacts;
             assert!(contacts.iter().any(|c| c.force.norm() > 0.0));
         }

@@ -144,7 +144,7 @@ impl<'a> RodInverse<'a> {
         let rest = FreeRod::new(Rod::new(robot, plan));
         let length = robot.backbone().total_length();
         let count = robot.tendons().len();
-        let lever = |k: usize| rest.softness(k).sqrt().max(LEVER * length);
+        let lever = |k: usize| rest.shortening(k).sqrt().max(LEVER * length);
         let units: Vec<f64> = (0..count).map(|k| 1.0 / lever(k)).collect();
         let mut inverse = Self {
             robot,
@@ -354,9 +354,9 @@ impl Inverter for RodInverse<'_> {
         self.solve_without_fault(work, |work| {
             work.problem.forget();
             let given = if let Some(state) = start {
-                work.problem.rod.begin(state)
+                work.problem.rod.start_from(state)
             } else {
-                work.problem.rod.rest();
+                work.problem.rod.reset();
                 false
             };
             self.search(target, given, self.options(self.settings.starts), work)

@@ -14,8 +14,8 @@ use crate::model::{Model, Report, State};
 use crate::obstacle::{Fault, Near};
 use crate::robot::Robot;
 use crate::rod::dual_newton::Ending;
-use crate::rod::model::{Rod, read_state, told, write_state};
-use crate::rod::newton_system::Chain;
+use crate::rod::model::{Rod, read_state, report, write_state};
+use crate::rod::newton_system::NewtonSystem;
 use crate::rod::plan::Plan;
 use crate::status::Status;
 
@@ -27,7 +27,7 @@ pub struct Scratch {
     pub(in crate::rod) state: State,
     pub(in crate::rod) descent: Descent,
     /// For the compliance of the tendons at rest.
-    pub(in crate::rod) chain: Chain,
+    pub(in crate::rod) chain: NewtonSystem,
     /// The last solve, or the last load that was reached.
     pub(in crate::rod) kept: Checkpoint,
     pub(in crate::rod) left: Left,
@@ -184,7 +184,7 @@ impl<'r> LoadedRod<'r> {
 
     fn finish(&self, work: &mut Scratch, evaluations: usize) -> Report {
         self.written(work);
-        told(work.ending, work.left.worst(), evaluations)
+        report(work.ending, work.left.worst(), evaluations)
     }
 
     /// The shape at hand, written out.
