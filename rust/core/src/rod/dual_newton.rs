@@ -38,7 +38,7 @@ pub(super) enum Ending {
     /// At the minimum.
     #[default]
     Converged,
-    /// Where no longer step keeps every subsegment at a minimum.
+    /// No longer step keeps every subsegment at a minimum.
     Lost,
     /// Out of evaluations.
     Spent,
@@ -129,6 +129,7 @@ impl DualNewton {
                 if system.added_compliance == 0.0 {
                     return (ending, residual);
                 }
+                // On to a stiffer one.
                 compliance = next;
                 factor = (factor * factor).max(FACTOR.0 * FACTOR.0);
                 self.solved.save(system);
@@ -226,6 +227,7 @@ impl DualNewton {
         let balanced = path.balance == LOOSE_BALANCE || residual.moment <= path.balance;
         let sound =
             residual.worst().is_finite() && residual.stable && residual.moved < JUMP && balanced;
+        // A start has no step to shorten: once more in tight balance.
         let Some(step) = path.step else {
             if sound {
                 return Verdict::Good;
@@ -238,7 +240,7 @@ impl DualNewton {
             self.start.restore(system);
             return Verdict::Retry;
         };
-        // A quarter of the step, or the secant rule where the slope has turned past the maximum.
+        // Shares of the step: a quarter, or the secant rule where the slope has turned past the maximum.
         let slope = system.dual_slope(&self.tension_step);
         let share = if !sound {
             0.25 * step.share

@@ -21,6 +21,7 @@ pub(super) fn message(failure: &Failure<'_>, displacements: &[f64]) -> String {
     if *ending == Ending::Stopped {
         return "stopped before the end".to_owned();
     }
+    // Given tensions.
     if displacements.is_empty() {
         let text = match ending {
             Ending::Spent => "max_iterations did not suffice to reach the tensions",
@@ -61,6 +62,7 @@ pub(super) fn message(failure: &Failure<'_>, displacements: &[f64]) -> String {
         text += &held.join(", ");
         text += "; free them (inf), release them";
     }
+    // Rigid tendons may depend on each other.
     let several = displacements.iter().filter(|d| d.is_finite()).count() > 1;
     if several && plan.compliance.iter().all(|compliance| *compliance == 0.0) {
         text += if held.is_empty() { "; " } else { ", or " };

@@ -93,10 +93,9 @@ impl NewtonSystem {
     /// Sets the rest shape without tensions.
     pub(super) fn reset(&mut self, plan: &Plan) {
         self.strains.clear();
-        let (width, elements) = (plan.unknowns(), plan.settings.elements);
         for data in &plan.data {
-            for _ in 0..elements {
-                self.strains.extend_from_slice(&data.elasticity.rest()[..width]);
+            for _ in 0..plan.settings.elements {
+                self.strains.extend_from_slice(&data.elasticity.rest()[..plan.unknowns()]);
             }
         }
         self.tensions.clear();
@@ -132,6 +131,7 @@ impl NewtonSystem {
     /// Subsegments that are off balance by more than `balance` \[rad of their own stiffness\] are brought nearer
     /// first, each by itself.
     pub(super) fn assemble(&mut self, plan: &Plan, balance: f64) -> Residual {
+        // Buffers of the size of the plan; sums begin at zero.
         let (size, tendons) = (plan.width(), self.bounds.len());
         self.factors.resize(plan.data.len() * size * size, 0.0);
         self.whitened_gradients.resize(plan.data.len() * size, 0.0);
@@ -191,6 +191,7 @@ impl NewtonSystem {
                 (residual.moment, residual.evaluations) = (f64::INFINITY, usize::MAX);
                 continue;
             }
+            // The derivatives of the subsegment, in its parts of the buffers.
             let (first, last) = (plan.starts[i], plan.starts[i + 1]);
             let pieces = &plan.pieces[first..last];
             let strains = &mut self.strains[i * size..(i + 1) * size];
@@ -209,11 +210,13 @@ impl NewtonSystem {
                     .differentiate::<D, ONE>(data, pieces, strains, tensions, active, &mut out);
                 let scale = data.elasticity.bending();
                 let stable = factorize(out.hessian, &mut self.unfactored, size, scale);
+                // max |g| / K.
                 let mut moment = 0.0_f64;
                 for (k, g) in out.gradient.iter().enumerate() {
                     moment = moment.max(data.elasticity.strain_under(k % D, g.abs()));
                 }
                 evaluations += 1;
+                // Relaxation, until it is balanced or has jumped.
                 let off = moment > balance || (!stable && moment > ON_RIDGE);
                 let step = if off && evaluations <= RELAXATIONS && moved < JUMP {
                     self.local.relax::<D>(kind, data, pieces, strains, tensions, &out)
@@ -242,6 +245,7 @@ impl NewtonSystem {
                     continue;
                 }
                 self.length_error[piece.tendon] += lengths[k];
+                // −A_i H_i⁻¹ g_i and A_i H_i⁻¹ A_iᵀ, lower triangle.
                 let (before, row) = rows.split_at_mut(k * size);
                 let row = &mut row[..size];
                 forward(factor, size, row);
@@ -271,11 +275,11 @@ impl NewtonSystem {
         let rows = self.strains.chunks_exact_mut(size).zip(earlier.chunks_exact(size));
         for (i, (own, earlier)) in rows.enumerate() {
             let (data, pieces) = (&plan.data[i], &plan.pieces[plan.starts[i]..plan.starts[i + 1]]);
-            let mut value = |strains: &[f64]| {
+            let mut energy = |strains: &[f64]| {
                 self.local.place::<D>(kind, data, strains);
                 self.local.value::<D>(data, pieces, strains, &self.tensions)
             };
-            let (before, after) = (value(earlier), value(own));
+            let (before, after) = (energy(earlier), energy(own));
             // Rounding decides nothing.
             if after.is_nan() || after > before + ROUNDING * before.abs() {
                 own.copy_from_slice(earlier);
@@ -343,10 +347,8 @@ impl NewtonSystem {
         if !program.solve(reduced_schur, reduced_gradient, least_steps, |k| least_steps[k] < 0.0) {
             return false;
         }
-        let steps = program.step.iter();
-        for (k, step) in (0..tendons).filter(|k| self.bounds[*k].is_finite()).zip(steps) {
-            self.tension_step[k] = *step;
-        }
+        let steps = self.tension_step.iter_mut().zip(&self.bounds).filter(|(_, b)| b.is_finite());
+        steps.zip(&program.step).for_each(|((own, _), step)| *own = *step);
         true
     }
 
@@ -379,17 +381,17 @@ fn factorize(hessian: &mut [f64], unfactored: &mut Vec<f64>, size: usize, stiffn
     }
 }
 
-/// Factors a Hessian that is not positive definite into `factor`, with a share of the stiffness on its diagonal that
-/// grows by `growth` until it is.
+/// Factors a Hessian that is not positive definite into `factor`, with a share of the stiffness's scale on its diagonal
+/// that grows by `growth` until it is.
 #[cold]
-pub(super) fn raise(factor: &mut [f64], hessian: &[f64], size: usize, stiffness: f64, growth: f64) {
-    let mut shift = SHIFT * stiffness;
+pub(super) fn raise(factor: &mut [f64], hessian: &[f64], size: usize, scale: f64, growth: f64) {
+    let mut shift = SHIFT * scale;
     loop {
         factor.copy_from_slice(hessian);
-        if shift > 1e9 * stiffness || shift.is_nan() {
+        if shift > 1e9 * scale || shift.is_nan() {
             // Not a number somewhere: the caller sees it in the residual.
             factor.fill(0.0);
-            (0..size).for_each(|k| factor[k * (size + 1)] = 1.0 / stiffness.sqrt());
+            (0..size).for_each(|k| factor[k * (size + 1)] = 1.0 / scale.sqrt());
             return;
         }
         for k in 0..size {

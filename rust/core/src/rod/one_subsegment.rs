@@ -108,8 +108,8 @@ impl OneSubsegment {
     }
 
     fn solve_near(&mut self) -> bool {
-        let mut budget = usize::MAX;
-        solve_near(&self.part, &mut self.system, &self.limits(), &mut budget).0
+        let (limits, mut budget) = (self.limits(), usize::MAX);
+        solve_near(&self.part, &mut self.system, &limits, &mut budget).0
     }
 
     /// Frame of the next disk in the base disk's.

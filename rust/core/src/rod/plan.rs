@@ -65,10 +65,12 @@ impl Plan {
         let mut slenderness = 0.0_f64;
         for i in 0..n {
             let length = backbone.lengths()[i] / elements;
+            // K and the rest strain of an element.
             let elasticity = Elasticity::new(backbone, i, length, elements, unit);
             data.push(Data { length, elasticity });
             slenderness = slenderness.max(elements * elements * length / elasticity.bending());
             starts.push(pieces.len());
+            // Tendons that run through it, from hole to hole.
             for (tendon, path) in robot.paths().iter().enumerate() {
                 if path.end() > i {
                     pieces.push(Piece { tendon, from: path.holes[i], to: path.holes[i + 1] });
@@ -147,7 +149,7 @@ impl Plan {
         }
     }
 
-    /// How displacements are imposed.
+    /// Law by which displacements are imposed.
     pub(crate) fn tendon_law(&self) -> TendonLaw {
         self.settings.tendons
     }

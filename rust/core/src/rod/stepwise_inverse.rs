@@ -124,6 +124,7 @@ impl StepwiseInverse {
             );
             // The gradient counts from this subsegment's own rest twist; the moment from the wanted one.
             let moment = elasticity.strain_under(2, elasticity.with_rest(2, gradient[2], twist));
+            // Residual: components of the end across the direction, relative to the length, and that moment.
             let node = &self.local.nodes[0];
             let end = self.local.end().translation / data.length;
             let residual = Vector3::new(first.dot(&end), second.dot(&end), moment);
@@ -146,6 +147,7 @@ impl StepwiseInverse {
                 Vector3::new(h[6], h[7], h[8]).map(|h| elasticity.strain_under(2, h)).transpose(),
             ]);
             let step = jacobian.try_inverse()? * residual;
+            // No strain moves by more than a longest step.
             let share = 1.0_f64.min(STEP / step.amax().max(f64::MIN_POSITIVE));
             strain -= step * share;
         }

@@ -31,11 +31,11 @@ pub(super) struct Data {
 /// Values and derivatives at a point, in slices of the caller's arrays.
 #[derive(Debug)]
 pub(super) struct Derivatives<'a> {
-    /// Of the energy and the tensions' work, by the strains.
+    /// Gradient of the energy and the tensions' work by the strains.
     pub(super) gradient: &'a mut [f64],
-    /// Lower triangle, row by row; blocks above the diagonal are written too.
+    /// Hessian, lower triangle, row by row; blocks above the diagonal are written too.
     pub(super) hessian: &'a mut [f64],
-    /// Of every piece's length, one row per piece.
+    /// Gradient of every piece's length, one row per piece.
     pub(super) rows: &'a mut [f64],
     /// Length of every piece \[m\].
     pub(super) lengths: &'a mut [f64],
@@ -56,7 +56,7 @@ pub(super) struct Node {
     force: Vector3<f64>,
     moment: Vector3<f64>,
     dyad: Matrix3<f64>,
-    /// Of the couple that turning a nearer element adds.
+    /// Couple that turning a nearer element adds.
     couple: [Vector3<f64>; 4],
 }
 
@@ -185,6 +185,7 @@ impl Local {
             }
             let row = &mut out.rows[p * size..(p + 1) * size];
             let tension = tensions[piece.tendon];
+            // A tendon without tension has a row, but does no work.
             out.lengths[p] = self.add_piece::<D, ONE>(piece, tension, row, out.hessian);
             if tension != 0.0 {
                 any_tension = true;
@@ -199,8 +200,8 @@ impl Local {
         }
     }
 
-    /// Adds one piece: the derivatives of its length into `row`, the turn of its direction to the Hessian, and its force
-    /// to the sums for the curvature of the path of its hole. Returns its length.
+    /// Adds one piece: the derivatives of its length into `row`, the turn of its direction to the Hessian, and its
+    /// force to the sums for the curvature of the path of its hole. Returns its length.
     #[inline(always)]
     fn add_piece<const D: usize, const ONE: bool>(
         &mut self,
@@ -236,6 +237,7 @@ impl Local {
                 node.force += own;
                 node.moment += x.cross(&own);
                 node.dyad += own * x.transpose();
+                // ∂p/∂x, the velocity of the hole.
                 for c in 0..3 {
                     node.moved[c] = node.sweep[c] + node.spin[c].cross(&lever);
                 }

@@ -1,8 +1,8 @@
 //! Rod alone under tensions.
 //!
 //! Given tensions every subsegment is at a minimum of its own. From one equilibrium to the next leads the step
-//! `dx = −H⁻¹ (g + Aᵀ dT)` of [`NewtonSystem`], whose error is of second order, and Newton steps. The g that remains counts
-//! to first order in all that is read off.
+//! `dx = −H⁻¹ (g + Aᵀ dT)` of [`NewtonSystem`], whose error is of second order, and Newton steps. The g that remains
+//! counts to first order in all that is read off.
 
 use nalgebra::Vector3;
 
@@ -18,7 +18,8 @@ use crate::rod::plan::Plan;
 use crate::rod::tip_rates::{SolvedRod, TipRates};
 use crate::solve::dense::dot;
 
-/// Limits of a solve at given tensions. The square of the residual \[rad of the own stiffness\] is below every tolerance.
+/// Limits of a solve at given tensions. The square of the residual \[rad of the own stiffness\] is below every
+/// tolerance.
 const LIMITS: Limits = Limits { newton_steps: 12, tolerance: 1e-6, shortest_load_step: 1e-2 };
 /// No strain moves further in one step \[rad\].
 const STEP: f64 = 0.5;
@@ -90,6 +91,7 @@ impl<'r> FreeRod<'r> {
         let plan = self.plan();
         let distances = self.points.each_ref().map(|point| point.distance(tensions));
         let (from, to) = (self.at, farthest(&distances, self.at));
+        // Twice the share of the step before.
         *share = (2.0 * *share).min(1.0);
         loop {
             let [base, other] = self.points.get_disjoint_mut([from, to]).ok()?;
@@ -101,6 +103,7 @@ impl<'r> FreeRod<'r> {
                 return None;
             }
             *share = share.min(STEP / base.longest_strain_step());
+            // The point there, in place of the one that is least useful.
             let system = &mut other.system;
             system.clear_bounds(plan);
             system.active.clone_from(&base.active);

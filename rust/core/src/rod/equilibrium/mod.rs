@@ -50,8 +50,8 @@ pub(crate) trait Equilibrium: Debug {
     /// Derivative of a displacement by a tension.
     fn displacement_slope(&self, k: usize, by: usize) -> f64;
 
-    /// Saves the equilibrium at hand in one of three slots for [`Self::restore`]: tensions do not always determine which
-    /// one it is.
+    /// Saves the equilibrium at hand in one of three slots for [`Self::restore`]: tensions do not always determine
+    /// which one it is.
     fn save(&mut self, slot: usize);
 
     /// Starts from the equilibrium that was saved in a slot, instead of rest.

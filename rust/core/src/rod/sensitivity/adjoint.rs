@@ -28,7 +28,8 @@ impl Sensitivity<'_> {
         let mut out = self.no_change();
         let mut local = Local::default();
         let mut right = vec![0.0; self.at.strains.len()];
-        // y: f summed from the tip into forces and moments on the strains. Force and moment about the world's origin of all that lies beyond.
+        // y: f summed from the tip into forces and moments on the strains. `wrench`: force and moment about the world's
+        // origin of all that lies beyond.
         let mut wrench = Vector6::zeros();
         for i in (0..n).rev() {
             let at = self.at.frames[i + 1].translation;
@@ -107,6 +108,7 @@ impl Sensitivity<'_> {
                     out.displacements[piece.tendon] += by.displacement;
                 }
             }
+            // Lengths: by the stiffness, and by the holes that they move.
             out.lengths[i] += share / plan.length(i);
         }
         // ∂b/∂q by the rest lengths of the pieces.

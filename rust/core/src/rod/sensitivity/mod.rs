@@ -23,24 +23,24 @@ use crate::solve::pseudo_inverse::PseudoInverse;
 /// Change q of what a rod is made of, or a gradient by it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// Of each displacement \[m\].
+    /// Change of each displacement \[m\].
     pub displacements: Vec<f64>,
-    /// Of each subsegment's rest rotation vector \[rad\].
+    /// Change of each subsegment's rest rotation vector \[rad\].
     pub rest: Vec<Vector3<f64>>,
-    /// Of each tendon's holes, disk 0 to its end, in the disks' frames \[m\].
+    /// Change of each tendon's holes, disk 0 to its end, in the disks' frames \[m\].
     pub holes: Vec<Vec<Vector3<f64>>>,
-    /// Of each subsegment's length, its stiffness per length unchanged \[m\].
+    /// Change of each subsegment's length, its stiffness per length unchanged \[m\].
     pub lengths: Vec<f64>,
-    /// Of Poisson's ratio.
+    /// Change of Poisson's ratio.
     pub poisson_ratio: f64,
 }
 
 /// Variation of the shape by a change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variation {
-    /// Of every element's strain: rotation vector, and elongation where there is one.
+    /// Rate of every element's strain: rotation vector, and elongation where there is one.
     pub strains: Vec<f64>,
-    /// Of each tension, in the unit of the results; of the base piece where displacements are proportional.
+    /// Rate of each tension, in the unit of the results; of the base piece where displacements are proportional.
     pub tensions: Vec<f64>,
     /// Velocity of each disk's centre, world axes \[m\].
     pub velocities: Vec<Vector3<f64>>,

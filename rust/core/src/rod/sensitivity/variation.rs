@@ -56,6 +56,7 @@ impl Sensitivity<'_> {
                 let turned = end.rotation * to;
                 let moved = end.translation * share + turned - from;
                 let direction = (moved - at.direction * at.direction.dot(&moved)) / at.length;
+                // Lever and velocity of the hole, element by element.
                 for (e, node) in local.nodes.iter().enumerate() {
                     let lever = at.point - node.end.translation;
                     let shifted = (end.translation - node.end.translation) * share + turned;
