@@ -2,8 +2,8 @@
 //!
 //! Stationarity of every subsegment, `H_i dx_i + A_iᵀ dT = −g_i`, and the lengths, `Σ A_i dx_i − C dT = b + C T − L`,
 //! make a block-diagonal system with one border row per tendon. Its Schur complement `S = Σ A_i H_i⁻¹ A_iᵀ + C` has
-//! the size of the number of tendons, and dT is a small quadratic program: no tension becomes negative.
-//! With the Cholesky factors `H_i = L_i L_iᵀ`, S is the product of the whitened rows `L_i⁻¹ A_iᵀ` with themselves.
+//! a row per tendon, and dT is a small quadratic program: no tension becomes negative. With the Cholesky factors
+//! `H_i = L_i L_iᵀ`, S is the product of the whitened rows `L_i⁻¹ A_iᵀ` with themselves.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,9 +33,8 @@ pub(super) struct NewtonSystem {
     pub(super) added_compliance: f64,
     /// Set by another thread to end the solve.
     pub(super) stop: Option<Arc<AtomicBool>>,
-    /// Newton step of the tensions, dT.
+    /// Newton step: dT and dx.
     pub(super) tension_step: Vec<f64>,
-    /// Newton step of the strains, dx.
     pub(super) strain_step: Vec<f64>,
     /// Frame of every subsegment's end in its base disk's.
     pub(super) ends: Vec<Pose>,
@@ -201,13 +200,12 @@ impl NewtonSystem {
                 rows: &mut self.whitened_rows[first * size..last * size],
                 lengths: &mut self.lengths[first..last],
             };
-            let (tensions, active) = (&self.tensions, &self.active);
+            let (local, tensions, active) = (&mut self.local, &self.tensions, &self.active);
             let (mut moved, mut evaluations) = (0.0, 0);
             // Balance: g_i, A_i and the factor of H_i, after Newton steps of the subsegment alone where it is off.
             loop {
-                self.local.place::<D>(kind, data, strains);
-                self.local
-                    .differentiate::<D, ONE>(data, pieces, strains, tensions, active, &mut out);
+                local.place::<D>(kind, data, strains);
+                local.differentiate::<D, ONE>(data, pieces, strains, tensions, active, &mut out);
                 let scale = data.elasticity.bending();
                 let stable = factorize(out.hessian, &mut self.unfactored, size, scale);
                 // max |g| / K.
@@ -218,12 +216,10 @@ impl NewtonSystem {
                 evaluations += 1;
                 // Relaxation, until it is balanced or has jumped.
                 let off = moment > balance || (!stable && moment > ON_RIDGE);
-                let step = if off && evaluations <= RELAXATIONS && moved < JUMP {
-                    self.local.relax::<D>(kind, data, pieces, strains, tensions, &out)
-                } else {
-                    None
-                };
-                if let Some(step) = step {
+                if (off && evaluations <= RELAXATIONS && moved < JUMP)
+                    && let Some(step) =
+                        local.relax::<D>(kind, data, pieces, strains, tensions, &out)
+                {
                     moved += step;
                     continue;
                 }
@@ -236,7 +232,7 @@ impl NewtonSystem {
             }
             residual.evaluations = residual.evaluations.max(evaluations);
             residual.moved = residual.moved.max(moved);
-            self.ends.push(self.local.end());
+            self.ends.push(local.end());
             // Whitening, L_i⁻¹ g_i and L_i⁻¹ A_iᵀ: products of these are what the subsegment adds to ∇D and S.
             let Derivatives { gradient, hessian: factor, rows, lengths } = out;
             forward(factor, size, gradient);
@@ -340,8 +336,7 @@ impl NewtonSystem {
             }
             self.reduced_gradient.push(self.dual_gradient[k]);
             self.reduced_schur.resize(self.reduced_gradient.len() * count, 0.0);
-            let least = if plan.signed { f64::NEG_INFINITY } else { -self.tensions[k] };
-            self.least_steps.push(least);
+            self.least_steps.push(if plan.signed { f64::NEG_INFINITY } else { -self.tensions[k] });
         }
         let Self { program, reduced_schur, reduced_gradient, least_steps, .. } = self;
         if !program.solve(reduced_schur, reduced_gradient, least_steps, |k| least_steps[k] < 0.0) {
