@@ -134,7 +134,7 @@ def inverse(
     )
     return Inverse(
         robot,
-        _frozen(wanted),  # type: ignore[arg-type]
+        _frozen(target if positions is None else positions),
         *row,
         model,
         settings,
