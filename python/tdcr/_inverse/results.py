@@ -12,11 +12,10 @@ import numpy as np
 from tdcr import _core
 from tdcr._base.status import Status
 from tdcr._base.value import Value
+from tdcr._io.save_load import Saved
 from tdcr.errors import NotConverged
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     from numpy.typing import NDArray
 
     from tdcr._core import (
@@ -39,7 +38,7 @@ __all__ = ["Inverse", "InverseBatch"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Inverse(Value):
+class Inverse(Saved, Value):
     """Displacements that bring the tool to a target, and how it went. Arrays are read-only."""
 
     robot: Robot
@@ -119,46 +118,6 @@ class Inverse(Value):
             return self
         raise NotConverged(f"{self.status}: {self.message}", self)
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the answer into a file that appears complete or not at all.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            Ending in .npz or .json, which `load` reads back equal. Replaced if it exists.
-
-        Raises
-        ------
-        InvalidInput
-            Another file ending.
-        OSError
-            The file cannot be written.
-        """
-        from tdcr._io.save_load import save
-
-        save(self, path)
-
-    @classmethod
-    def load(cls, path: str | PathLike[str]) -> Inverse:
-        """Read an answer that `save` wrote. No code of a file is run.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            File ending in .npz or .json.
-
-        Raises
-        ------
-        InvalidInput
-            Another file: names path and field, what was expected and what was there.
-        OSError
-            The file cannot be read.
-        """
-        from tdcr._io.save_load import load
-
-        loaded: Inverse = load(path, "Inverse")
-        return loaded
-
     def __repr__(self) -> str:
         """Tell the outcome and the displacements."""
         pulls = np.array2string(
@@ -171,7 +130,7 @@ class Inverse(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class InverseBatch(Value, Sequence[Inverse]):
+class InverseBatch(Saved, Value, Sequence[Inverse]):
     """Inverses of one robot, in the order of their targets; `batch[i]` is an `Inverse`."""
 
     robot: Robot
@@ -252,49 +211,6 @@ class InverseBatch(Value, Sequence[Inverse]):
         around = [" among the obstacles"] * bool(self.obstacles)
         around += [" under the loads"] * (self.loads is not None)
         return " and".join(around)
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the answers into a file that appears complete or not at all.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            Ending in .npz or .json, which `load` reads back equal;
-            or in .csv or .parquet, for other programs: a row per target. Replaced if it exists.
-
-        Raises
-        ------
-        InvalidInput
-            Another file ending.
-        ImportError
-            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
-        OSError
-            The file cannot be written.
-        """
-        from tdcr._io.save_load import save
-
-        save(self, path)
-
-    @classmethod
-    def load(cls, path: str | PathLike[str]) -> InverseBatch:
-        """Read answers that `save` wrote. No code of a file is run.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            File ending in .npz or .json.
-
-        Raises
-        ------
-        InvalidInput
-            Another file: names path and field, what was expected and what was there.
-        OSError
-            The file cannot be read.
-        """
-        from tdcr._io.save_load import load
-
-        loaded: InverseBatch = load(path, "InverseBatch")
-        return loaded
 
     def __repr__(self) -> str:
         """Tell size and outcome."""

@@ -11,7 +11,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from tdcr._io.robot_schema import TENDON_TABLES, BackboneTable, RobotTable, metres
+from tdcr._io.lengths import metres
+from tdcr._io.robot_schema import TENDON_TABLES, BackboneTable, RobotTable
 from tdcr.errors import InvalidInput
 
 __all__ = ["meaning", "structure"]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import textwrap
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -35,10 +36,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FAILED",
+    "axes_of",
     "check_picture",
     "one_of",
     "plot_shape",
     "require_matplotlib",
+    "save_drawing",
     "save_figure",
     "save_picture",
 ]
@@ -46,6 +49,7 @@ __all__ = [
 View = Literal["auto", "2d", "3d"]
 
 FAILED = "#B3261E"
+_SIZE = (6.4, 5.6)
 
 
 def plot_shape(
@@ -114,7 +118,7 @@ def plot_shape(
     if ax is None:
         from matplotlib import pyplot
 
-        ax = _axes(pyplot.figure(figsize=_SIZE, layout="constrained"), flat)
+        ax = axes_of(pyplot.figure(figsize=_SIZE, layout="constrained"), flat)
     canvas = Flat(ax, plane, scene) if flat else Solid(ax, plane, scene)
     for obstacle in shape.obstacles if obstacles else ():
         canvas.obstacle(obstacle)
@@ -126,9 +130,6 @@ def plot_shape(
     canvas.finish()
     _label(ax, scene, title, legend and tendons)
     return ax
-
-
-_SIZE = (6.4, 5.6)
 
 
 def save_picture(shape: Shape, path: str | os.PathLike[str], **options: Any) -> None:
@@ -158,7 +159,23 @@ def save_picture(shape: Shape, path: str | os.PathLike[str], **options: Any) -> 
     marks = options.get("marks")
     places = None if marks is None else places_of(marks)
     flat = _is_flat(shape, options.get("view", "auto"), plane_of(shape), None, places)
-    plot_shape(shape, ax=_axes(figure, flat), **options)
+    plot_shape(shape, ax=axes_of(figure, flat), **options)
+    save_figure(figure, path)
+
+
+def save_drawing(
+    draw: Callable[[Axes], object],
+    path: str | os.PathLike[str],
+    *,
+    flat: bool,
+    size: tuple[float, float] = _SIZE,
+) -> None:
+    """Write what is drawn into axes, without pyplot; see `save_picture`."""
+    check_picture(path)
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    draw(axes_of(figure, flat))
     save_figure(figure, path)
 
 
@@ -229,7 +246,8 @@ def _lie_in(shape: Shape, plane: Plane, places: Points | None) -> bool:
     return bool(np.abs(off).max(initial=0.0) <= 1e-6 * shape.robot.backbone.total_length)
 
 
-def _axes(figure: Figure, flat: bool) -> Axes:
+def axes_of(figure: Figure, flat: bool) -> Axes:
+    """Add plain or 3-D axes to a figure."""
     return figure.add_subplot() if flat else figure.add_subplot(projection="3d")
 
 

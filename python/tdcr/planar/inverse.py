@@ -18,7 +18,7 @@ from tdcr.errors import InvalidInput, NotConverged
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tdcr.planar.trunk import PlanarShape, PlanarTrunk
+    from tdcr.planar.shape import PlanarShape, Trunk
 
     Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ class PlanarInverse(Value):
 
     _hashed: ClassVar[tuple[str, ...]] = ("trunk", "turns", "method")
 
-    trunk: PlanarTrunk
+    trunk: Trunk
     turns: Array
     error: float
     heading_error: float
@@ -145,7 +145,7 @@ class PlanarInverseBatch(Value, Sequence[PlanarInverse]):
 
     _hashed: ClassVar[tuple[str, ...]] = ("trunk", "points", "method")
 
-    trunk: PlanarTrunk
+    trunk: Trunk
     points: Array
     method: str
     settings: PsoSettings | None
@@ -278,7 +278,7 @@ def _check(method: str, starts: int | None, swarm: Swarm) -> None:
 
 
 def one(
-    trunk: PlanarTrunk,
+    trunk: Trunk,
     target: tuple[float, float, float | None],
     method: str,
     limit: ArrayLike,
@@ -305,7 +305,7 @@ def one(
 
 
 def many(
-    trunk: PlanarTrunk,
+    trunk: Trunk,
     points: ArrayLike,
     heading: ArrayLike | None,
     method: str,

@@ -8,12 +8,25 @@ from typing import Any
 import click
 
 from tdcr import InvalidInput, Robot, RoutingSettings
-from tdcr._cli import options as own
 from tdcr._cli.click_types import Command, Commands
+from tdcr._cli.options import (
+    BOUNDS,
+    FILE,
+    ROBOT,
+    displacements_option,
+    examples,
+    json_option,
+    output_option,
+    picture_option,
+    read_targets,
+    target_option,
+)
+from tdcr._cli.output import check_picture, deliver, picture_of, report_outcome
+from tdcr._io.lengths import to_metres
 
 __all__ = ["design"]
 
-_TARGET = click.argument("target", type=own.FILE)
+_TARGET = click.argument("target", type=FILE)
 _CURVE = click.option(
     "--curve",
     is_flag=True,
@@ -24,9 +37,7 @@ _CURVE = click.option(
 @click.group(
     "design",
     cls=Commands,
-    epilog=own.examples(
-        "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
-    ),
+    epilog=examples("design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"),
 )
 def design() -> None:
     """Find the robot that takes a wanted shape."""
@@ -34,7 +45,7 @@ def design() -> None:
 
 def _wanted(robot: Robot, target: Path, unit: str | None, curve: bool) -> tuple[Any, str]:
     """Places of disks from a file, and the unit of the table."""
-    places, unit = own.points(target, unit)
+    places, unit = read_targets(target, unit)
     count = robot.backbone.count
     if curve:
         from tdcr.design import on_curve
@@ -53,31 +64,29 @@ def _done(found: Any, unit: str, json_file: str | None, files: tuple[str | None,
     from tdcr._cli.report import results as report
 
     output, plot_file = files
-    own.delivered(
+    deliver(
         lambda: report.design_json(found),
         lambda: report.print_design(found, unit),
         json_file,
         (output, found.robot.save),
-        (plot_file, own.picture_of(found.shape, found.target_positions)),
+        (plot_file, picture_of(found.shape, found.target_positions)),
     )
-    return own.said(found.ok, found.robot.name, found.status, found.message)
+    return report_outcome(found.ok, found.robot.name, found.status, found.message)
 
 
 @design.command(
     "prebend",
     cls=Command,
-    epilog=own.examples(
-        "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
-    ),
+    epilog=examples("design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"),
 )
-@own.ROBOT
+@ROBOT
 @_TARGET
-@own.displacements_option()
+@displacements_option()
 @_CURVE
-@own.target_option
-@own.json_option
-@own.picture_option
-@own.output_option("the robot with its new rest shape", ".toml", ".json")
+@target_option
+@json_option
+@picture_option
+@output_option("the robot with its new rest shape", ".toml", ".json")
 def prebend(
     robot: Path,
     target: Path,
@@ -95,21 +104,21 @@ def prebend(
     """
     from tdcr.design import prebend as solve
 
-    own.checked_picture(plot_file)
+    check_picture(plot_file)
     arm = Robot.load(robot)
     places, unit = _wanted(arm, target, unit, curve)
-    found = solve(arm, places, own.in_metres(displacements, unit))
+    found = solve(arm, places, to_metres(displacements, unit))
     return _done(found, unit, json_file, (output, plot_file))
 
 
 @design.command(
     "routing",
     cls=Command,
-    epilog=own.examples(
+    epilog=examples(
         "design routing finger.toml places.csv --holes 12 --bounds -10 0 --output routed.toml"
     ),
 )
-@own.ROBOT
+@ROBOT
 @_TARGET
 @click.option(
     "--holes",
@@ -118,12 +127,12 @@ def prebend(
     show_default=True,
     help="Holes per disk, evenly spaced; 0 allows any azimuth.",
 )
-@own.BOUNDS
+@BOUNDS
 @_CURVE
-@own.target_option
-@own.json_option
-@own.picture_option
-@own.output_option("the robot with its new routing", ".toml", ".json")
+@target_option
+@json_option
+@picture_option
+@output_option("the robot with its new routing", ".toml", ".json")
 def routing(
     robot: Path,
     target: Path,
@@ -141,10 +150,10 @@ def routing(
     """
     from tdcr.design import routing as solve
 
-    own.checked_picture(plot_file)
+    check_picture(plot_file)
     arm = Robot.load(robot)
     places, unit = _wanted(arm, target, unit, curve)
-    limits = None if bounds is None else tuple(own.in_metres(bounds, unit))
+    limits = None if bounds is None else tuple(to_metres(bounds, unit))
     settings = RoutingSettings(holes=holes or None)
     found = solve(arm, places, bounds=limits, settings=settings)  # type: ignore[arg-type]
     return _done(found, unit, json_file, (output, plot_file))

@@ -9,8 +9,17 @@ from typing import Any
 import click
 
 from tdcr import InvalidInput, Robot, read_measurements
-from tdcr._cli import options as own
 from tdcr._cli.click_types import Command
+from tdcr._cli.options import (
+    FILE,
+    ROBOT,
+    examples,
+    json_option,
+    model_option,
+    output_option,
+    picture_option,
+)
+from tdcr._cli.output import check_picture, deliver, report_outcome, warn
 
 __all__ = ["fit"]
 
@@ -25,13 +34,13 @@ def _names(
 @click.command(
     "fit",
     cls=Command,
-    epilog=own.examples(
+    epilog=examples(
         "fit finger.toml bench.csv --unit mm --pull-sign positive --parameters gain "
         "--output fitted.toml"
     ),
 )
-@own.ROBOT
-@click.argument("measurements", type=own.FILE)
+@ROBOT
+@click.argument("measurements", type=FILE)
 @click.option(
     "--unit",
     type=click.Choice(["m", "cm", "mm", "um", "in"]),
@@ -70,14 +79,14 @@ def _names(
     metavar="LENGTH",
     help="Tendons released by this much or more, in --unit, are slack.",
 )
-@own.model_option("rod", "constant_curvature")
+@model_option("rod", "constant_curvature")
 @click.option(
     "--validation", type=float, default=0.2, show_default=True, help="Share of rows held out."
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the rows held out.")
-@own.json_option
-@own.picture_option
-@own.output_option("the fitted robot", ".toml", ".json")
+@json_option
+@picture_option
+@output_option("the fitted robot", ".toml", ".json")
 def fit(
     robot: Path,
     measurements: Path,
@@ -96,7 +105,7 @@ def fit(
     from tdcr._plot.shape import save_figure
     from tdcr.design import fit as solve
 
-    own.checked_picture(plot_file)
+    check_picture(plot_file)
     arm = Robot.load(robot)
     unit = options["unit"]
     with warnings.catch_warnings(record=True, action="always") as doubts:
@@ -123,7 +132,7 @@ def fit(
         message = f"{measurements}: expected a pull, got releases alone: try --pull-sign {other}"
         raise InvalidInput(message, "pull_sign")
     for doubt in doubts:
-        own.warn(doubt.message)
+        warn(doubt.message)
     found = solve(
         arm,
         measured,
@@ -133,11 +142,11 @@ def fit(
         seed=options["seed"],
     )
     shown = "m" if unit == "m" else "mm"
-    own.delivered(
+    deliver(
         lambda: report.fit_json(found, measured),
         lambda: report.print_fit(found, measured, shown),
         json_file,
         (output, found.robot.save),
         (plot_file, lambda path: save_figure(found.plot().figure, path)),
     )
-    return own.said(found.ok, arm.name, found.status, found.message)
+    return report_outcome(found.ok, arm.name, found.status, found.message)

@@ -8,9 +8,31 @@ import click
 
 import tdcr
 from tdcr import Robot
-from tdcr._cli import options as own
 from tdcr._cli.click_types import Command
-from tdcr._io.obstacle_file import obstacles_option, read_obstacles
+from tdcr._cli.options import (
+    ROBOT,
+    displacements_option,
+    examples,
+    json_option,
+    model_option,
+    obstacles_option,
+    output_option,
+    picture_option,
+    unit_option,
+)
+from tdcr._cli.output import (
+    check_picture,
+    check_writable,
+    deliver,
+    doubt_unit,
+    largest_size,
+    picture_of,
+    report_outcome,
+    write_text,
+)
+from tdcr._io.lengths import to_metres
+from tdcr._io.obstacle_file import read_obstacles
+from tdcr._io.save_load import json_text
 
 __all__ = ["forward", "schema"]
 
@@ -18,20 +40,20 @@ __all__ = ["forward", "schema"]
 @click.command(
     "forward",
     cls=Command,
-    epilog=own.examples(
+    epilog=examples(
         "forward trunk.toml -d -15 free free free -5 free --unit mm --output pulled.npz",
         "forward trunk.toml -d -15 free free free free free --unit mm --obstacles bar.toml "
         "--output leaning.npz",
     ),
 )
-@own.ROBOT
-@own.displacements_option()
-@own.model_option("rod", "linkage", "constant_curvature")
-@own.unit_option("the displacements")
+@ROBOT
+@displacements_option()
+@model_option("rod", "linkage", "constant_curvature")
+@unit_option("the displacements")
 @obstacles_option
-@own.json_option
-@own.picture_option
-@own.output_option("the shape", ".npz", ".json", ".csv")
+@json_option
+@picture_option
+@output_option("the shape", ".npz", ".json", ".csv")
 def forward(
     robot: Path,
     displacements: list[float],
@@ -45,26 +67,26 @@ def forward(
     """Solve the shape of the robot in file ROBOT (.toml or .json)."""
     from tdcr._cli.report import shape as report
 
-    own.checked_picture(plot_file)
-    pulls = own.in_metres(displacements, unit)
+    check_picture(plot_file)
+    pulls = to_metres(displacements, unit)
     arm, around = Robot.load(robot), read_obstacles(obstacles)
     shape = tdcr.forward(arm, pulls, model=model, obstacles=around)
-    own.delivered(
-        lambda: report.as_json(shape),
+    deliver(
+        lambda: json_text(shape),
         lambda: report.print_shape(shape, unit),
         json_file,
         (output, shape.save),
-        (plot_file, own.picture_of(shape)),
+        (plot_file, picture_of(shape)),
     )
-    doubt = own.unit_doubted(unit, own.largest(pulls), shape.robot)
-    return own.said(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
+    doubt = doubt_unit(unit, largest_size(pulls), shape.robot)
+    return report_outcome(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
 
 
-@click.command("schema", epilog=own.examples("schema --output robot.schema.json", files=False))
+@click.command("schema", epilog=examples("schema --output robot.schema.json", files=False))
 @click.option(
     "-o",
     "--output",
-    callback=own.writable,
+    callback=check_writable,
     metavar="FILE",
     help="Write there instead of to stdout.",
 )
@@ -78,4 +100,4 @@ def schema(output: str | None) -> None:
     if output is None:
         click.echo(text.encode())
     else:
-        own.write_text(output, text + "\n")
+        write_text(output, text + "\n")

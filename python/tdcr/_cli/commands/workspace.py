@@ -9,9 +9,28 @@ import click
 
 import tdcr
 from tdcr import Robot
-from tdcr._cli import options as own
 from tdcr._cli.click_types import Command, Numbers, read_numbers
-from tdcr._io.obstacle_file import obstacles_option, read_obstacles
+from tdcr._cli.options import (
+    ROBOT,
+    examples,
+    json_option,
+    model_option,
+    obstacles_option,
+    output_option,
+    picture_option,
+    unit_option,
+)
+from tdcr._cli.output import (
+    check_picture,
+    deliver,
+    doubt_unit,
+    largest_size,
+    report_rows,
+    save_workspace_picture,
+    shows_progress,
+)
+from tdcr._io.lengths import to_metres
+from tdcr._io.obstacle_file import read_obstacles
 
 __all__ = ["workspace"]
 
@@ -35,12 +54,12 @@ def _ranges(
 @click.command(
     "workspace",
     cls=Command,
-    epilog=own.examples(
+    epilog=examples(
         "workspace trunk.toml --ranges -10:0 free free free -6:0 free --unit mm "
         "--samples 2000 --sampling random --output cloud.npz"
     ),
 )
-@own.ROBOT
+@ROBOT
 @click.option(
     "--ranges",
     cls=Numbers,
@@ -59,11 +78,11 @@ def _ranges(
     help="How displacements are drawn; sobol needs scipy.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of sobol and random.")
-@own.model_option("rod", "linkage", "constant_curvature")
-@own.unit_option("the ranges")
+@model_option("rod", "linkage", "constant_curvature")
+@unit_option("the ranges")
 @obstacles_option
-@own.json_option
-@own.picture_option
+@json_option
+@picture_option
 @click.option(
     "--view",
     type=click.Choice(["section", "3d"]),
@@ -71,7 +90,7 @@ def _ranges(
     show_default=True,
     help="Of the picture.",
 )
-@own.output_option("the samples", ".npz", ".json", ".csv", ".parquet")
+@output_option("the samples", ".npz", ".json", ".csv", ".parquet")
 def workspace(
     robot: Path,
     ranges: list[tuple[float, float]],
@@ -89,11 +108,11 @@ def workspace(
     """Sample where the tip of the robot in file ROBOT gets."""
     from tdcr._cli.report import results as report
 
-    own.checked_picture(plot_file)
+    check_picture(plot_file)
     arm = Robot.load(robot)
     if len(ranges) == 1:
         ranges = ranges * len(arm.tendons)
-    limits = [tuple(own.in_metres(pair, unit)) for pair in ranges]
+    limits = [tuple(to_metres(pair, unit)) for pair in ranges]
     if all(pair == (inf, inf) for pair in limits):
         raise click.BadParameter("expected a tendon that is not free", param_hint="--ranges")
     found = tdcr.workspace(
@@ -104,16 +123,16 @@ def workspace(
         seed=seed,
         model=model,
         obstacles=read_obstacles(obstacles),
-        progress=own.progress(),
+        progress=shows_progress(),
     )
     nothing = plot_file is not None and not found.ok.any()
-    own.delivered(
+    deliver(
         lambda: report.workspace_json(found),
         lambda: report.print_workspace(found, unit),
         json_file,
         (output, found.save),
-        (None if nothing else plot_file, lambda path: own.workspace_picture(found, path, view)),
+        (None if nothing else plot_file, lambda path: save_workspace_picture(found, path, view)),
     )
-    longest = own.largest(end for pair in limits for end in pair)
-    doubt = own.unit_doubted(unit, longest, arm)
-    return own.rows_said(found, "; no picture" * nothing + doubt)
+    longest = largest_size(end for pair in limits for end in pair)
+    doubt = doubt_unit(unit, longest, arm)
+    return report_rows(found, "; no picture" * nothing + doubt)

@@ -13,6 +13,7 @@ from tdcr._base.progress import told
 from tdcr._base.status import Status
 from tdcr._base.value import Value
 from tdcr._core import Robot, RoutingSettings
+from tdcr._io.save_load import Saved
 from tdcr.design.targets import wanted_places
 from tdcr.errors import InvalidInput, NotConverged
 
@@ -26,7 +27,7 @@ __all__ = ["Routing", "routing", "routing_batch"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Routing(Value):
+class Routing(Saved, Value):
     """A robot routed for a shape, and how it went. Arrays are read-only."""
 
     robot: Robot

@@ -13,6 +13,7 @@ from tdcr._base.arguments import several_obstacles
 from tdcr._base.status import Status
 from tdcr._base.value import Value
 from tdcr._core import Obstacle, PrebendSettings, Robot, clearance, forward
+from tdcr._io.save_load import Saved
 from tdcr.design.targets import wanted_places
 from tdcr.errors import NotConverged
 
@@ -29,7 +30,7 @@ _TOUCH, _SAME = 1e-9, 1e-7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Prebend(Value):
+class Prebend(Saved, Value):
     """A robot designed for a shape, and how it went. Arrays are read-only."""
 
     robot: Robot

@@ -11,6 +11,7 @@ import numpy as np
 from tdcr._base.status import Status
 from tdcr._base.value import Value
 from tdcr._core import Robot
+from tdcr._io.save_load import Saved
 from tdcr.design.fit_checks import checked, far_off, unsolved, whole
 from tdcr.design.measurements import Measurements
 from tdcr.errors import InvalidInput, NotConverged
@@ -33,7 +34,7 @@ _BLIND = 1e-12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fit(Value):
+class Fit(Saved, Value):
     """Parameters fitted to measurements, and how well. Arrays are read-only.
 
     Rows without gaps and of finite displacements are the kept ones; all arrays are over these.
@@ -123,21 +124,12 @@ class Fit(Value):
         -------
         matplotlib Axes
         """
-        if ax is None:
-            from matplotlib.figure import Figure
+        from tdcr._plot.fit import plot_distances
 
-            ax = Figure(layout="constrained").add_subplot()
         part: Part = "validation" if self.validation.any() else "train"
-        for before, colour, label in ((True, "#9AA5B1", "before"), (False, "#C8553D", "after")):
-            distances = np.sort(self.distances(part, before=before)) * 1e3
-            share = np.arange(len(distances) + 1) / len(distances)
-            label = f"{label}, mean {self.mean(part, before=before) * 1e3:.3g} mm"
-            ax.step([0.0, *distances], share, where="post", color=colour, label=label)
         whose = {"validation": "held-out", "train": "fitted"}[part]
-        ax.set(xlabel="distance [mm]", ylabel=f"share of the {whose} points", ylim=(0, 1.03))
-        ax.grid(True)
-        ax.legend(frameon=False)
-        return ax
+        before, after = (self.distances(part, before=b) for b in (True, False))
+        return plot_distances(before, after, whose, ax)
 
     def plot_residuals(self, axes: Any = None) -> Any:
         """Draw measured minus predicted positions along x, y and z over the rows.
@@ -153,48 +145,11 @@ class Fit(Value):
         -------
         sequence of three matplotlib Axes
         """
-        if axes is None:
-            from matplotlib.figure import Figure
+        from tdcr._plot.fit import plot_residuals
 
-            axes = Figure(figsize=(7.0, 5.5), layout="constrained").subplots(3, sharex=True)
-        points = self.residuals.shape[1]
-        rows, held = np.repeat(self.rows, points), np.repeat(self.validation, points)
-        looks = [
-            (self.residuals_before, np.ones_like(held), "before", "#9AA5B1", "none"),
-            (self.residuals, ~held, "after, fitted to", "#2A6F97", "none"),
-            (self.residuals, held, "after, held out", "#C8553D", "#C8553D"),
-        ]
-        both = np.abs(np.concatenate([self.residuals_before, self.residuals])) * 1e3
-        limit = 2 * float(np.percentile(both, 99)) or 1.0
-        for c, axis in enumerate("xyz"):
-            ax = axes[c]
-            beyond = 0
-            for values, which, label, edge, face in looks:
-                if which.any():
-                    own = values[..., c].ravel()[which] * 1e3
-                    beyond += int((np.abs(own) > limit).sum())
-                    own = np.clip(own, -limit, limit)
-                    ax.scatter(
-                        rows[which],
-                        own,
-                        s=9,
-                        facecolors=face,
-                        edgecolors=edge,
-                        linewidths=0.7,
-                        label=label,
-                    )
-            ax.axhline(0, color="0.3", linewidth=0.8, zorder=0)
-            if beyond:
-                ax.text(0.99, 0.06, f"{beyond} beyond", transform=ax.transAxes, ha="right")
-            ax.set_ylabel(f"{axis} [mm]")
-            ax.grid(True, linewidth=0.4)
-        axes[0].set_title("measured minus predicted", fontsize=10)
-        axes[2].set_xlabel("row of the measurements")
-        ax = axes[0]
-        ax.legend(frameon=False, ncols=3, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1))
-        ax.title.set_horizontalalignment("left")
-        ax.title.set_x(0)
-        return axes
+        return plot_residuals(
+            self.residuals_before, self.residuals, self.rows, self.validation, axes
+        )
 
     def __repr__(self) -> str:
         """Tell what was fitted and how well."""
