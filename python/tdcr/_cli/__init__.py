@@ -76,11 +76,11 @@ def _run(arguments: Sequence[str] | None) -> int:
         return 0
     except click.BadParameter as error:
         missing = isinstance(error, click.MissingParameter)
-        return _refuse(_said(error) + _see_help(error) * missing)
+        return _refuse(_one_line(error) + _see_help(error) * missing)
     except click.UsageError as error:
-        return _refuse(_said(error) + _see_help(error))
+        return _refuse(_one_line(error) + _see_help(error))
     except click.ClickException as error:
-        return _refuse(_said(error))
+        return _refuse(_one_line(error))
     except (click.Abort, Interrupted):
         # On a terminal the line has a ^C already.
         click.echo("\n" * sys.stderr.isatty() + "tdcr: interrupted", err=True)
@@ -105,7 +105,7 @@ def _open_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _said(error: click.ClickException) -> str:
+def _one_line(error: click.ClickException) -> str:
     return " ".join(error.format_message().split())
 
 

@@ -57,7 +57,7 @@ def check_writable(
 
 
 def shows_progress() -> bool:
-    """Whether to draw a progress bar: on a terminal alone."""
+    """Tell if a progress bar is drawn: on a terminal alone."""
     return sys.stderr.isatty()
 
 

@@ -9,25 +9,22 @@ import numpy as np
 
 from tdcr import _core
 from tdcr._base.arguments import several_obstacles
-from tdcr._base.progress import told
+from tdcr._base.progress import progress_callback
 from tdcr._base.value import Value, same
 from tdcr._io.save_load import Saved
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from tdcr._base.models import Settings
     from tdcr._core import (
-        ConstantCurvatureSettings,
-        LinkageSettings,
         Loads,
         Obstacle,
         Robot,
-        RodSettings,
         Shape,
     )
 
     Floats: TypeAlias = NDArray[np.float64]
-    Settings: TypeAlias = RodSettings | LinkageSettings | ConstantCurvatureSettings
 
 __all__ = ["ShapeBatch", "forward_batch"]
 
@@ -284,7 +281,7 @@ def forward_batch(
     # Once: each row's shape is made of them again.
     obstacles = several_obstacles(obstacles)
     total = len(displacements) if isinstance(displacements, Sized) else None
-    with told(progress, "forward_batch", total) as tell:
+    with progress_callback(progress, "forward_batch", total) as tell:
         columns = _core._forward_batch(
             robot,
             displacements,
@@ -297,6 +294,7 @@ def forward_batch(
             progress=tell,
             warm=warm,
         )
+    # Records of contacts; the rows are the result's own.
     if "contacts" in columns:
         columns["contacts"] = _table(columns["contacts"])
     given = columns.pop("displacements")

@@ -14,9 +14,8 @@ from tdcr._io.field_reader import FieldReader
 from tdcr._io.plain_data import to_plain
 from tdcr._io.tables import force_unit, point_columns, row_columns, tendon_columns
 
-__all__ = ["MODELS", "batch_columns", "column", "statuses", "write_batch"]
+__all__ = ["batch_columns", "column", "statuses", "write_batch"]
 
-MODELS = ("rod", "linkage", "constant_curvature")
 _STATE = (
     "robot", "model", "settings", "displacements", "frames", "strains", "tendon_lengths",
     "tensions", "energy",
@@ -37,7 +36,7 @@ def _write_shape(shape: Any) -> dict[str, Any]:
 
 def _read_shape(reader: FieldReader) -> Any:
     robot = reader.robot()
-    model = reader.text("model", *MODELS)
+    model = reader.model()
     settings = reader.settings()
     rows = reader.sizes["n"] * getattr(settings, "elements", 1)
     wide = bool(np.shape(reader.array("strains", rows, -1))[1] == 4)
@@ -120,7 +119,7 @@ def write_batch(batch: Any) -> dict[str, Any]:
 
 
 def _read_batch(reader: FieldReader) -> ShapeBatch:
-    robot, model = reader.robot(), reader.text("model", *MODELS)
+    robot, model = reader.robot(), reader.model()
     settings, given = reader.settings(), reader.array("displacements", "B", "K")
     columns = {
         "status": statuses(reader, "status"),

@@ -48,7 +48,7 @@ def writer_of(path: StrPath) -> Callable[[StrPath, ShapeBatch], Writer]:
         expected = "a file ending in .npz or .parquet"
         raise InvalidInput(f"path: expected {expected}, got {os.fspath(path)!r}", "path")
     if Path(path).is_dir():
-        # Else it would be told after the last row.
+        # Else the fault would come after the last row.
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
     if suffix == ".npz":
         return _Npz
@@ -83,7 +83,7 @@ class _Parquet:
 
 
 class _Npz:
-    """What `ShapeBatch.save` writes: columns gathered in files of their own, then put together.
+    """The file that `ShapeBatch.save` writes: columns are gathered apart, then put together.
 
     A member of an archive is written from its first byte to its last, and has its shape in front.
     """

@@ -49,7 +49,7 @@ class Grasp(Saved, Value):
 
     @property
     def ok(self) -> bool:
-        """Whether every step of every finger converged."""
+        """True if every step of every finger converged."""
         return all(shape.ok for row in self.shapes for shape in row)
 
     @property
@@ -121,7 +121,7 @@ class Grasp(Saved, Value):
     def force_closure(
         self, friction: float = 0.0, *, step: int = -1, obstacle: int = 0, edges: int = 8
     ) -> bool:
-        """Whether contacts at these places can balance any force and moment on the object.
+        """Tell if contacts at these places can balance any force and moment on the object.
 
         Of places and normals alone: forces as large as it takes. Without friction that needs seven
         contacts and no body of revolution; a ball is never held.

@@ -10,7 +10,7 @@ import numpy as np
 
 from tdcr import _core
 from tdcr._base.arguments import several_obstacles, whole
-from tdcr._base.progress import told
+from tdcr._base.progress import progress_callback
 from tdcr._gripper.grasp import Grasp
 from tdcr._gripper.placing import places_around, pulls
 from tdcr.errors import InvalidInput
@@ -165,14 +165,16 @@ class Gripper:
         TypeError
             A value of another type.
         """
+        # Arguments.
         steps = whole("steps", steps, 1)
         goals = pulls(displacements, self.fingers)
         around = several_obstacles(obstacles)
         shares = np.linspace(0.0, 1.0, steps + 1)
         shares.flags.writeable = False
+        # Step by step, each finger from its last shape that converged.
         starts: list[Shape | None] = [None] * len(self.fingers)
         shapes = []
-        with told(progress, "close", steps + 1) as tell:
+        with progress_callback(progress, "close", steps + 1) as tell:
             for share in shares:
                 row = []
                 for k, (finger, goal) in enumerate(zip(self.fingers, goals, strict=True)):

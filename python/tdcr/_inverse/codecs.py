@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tdcr._forward.codecs import MODELS, statuses
+from tdcr._forward.codecs import statuses
 from tdcr._inverse.results import Inverse, InverseBatch
 from tdcr._io.codecs import Columns, Readers, read_nested, register, value_codec, write_value
 from tdcr._io.field_reader import FieldReader
@@ -42,7 +42,7 @@ def _sizes(value: Any) -> tuple[int, ...]:
 
 _BOTH: Readers = {
     "robot": FieldReader.robot,
-    "model": lambda r, name: r.text(name, *MODELS),
+    "model": FieldReader.model,
     "settings": FieldReader.settings,
     "bounds": lambda r, name: r.optional(name, ("Bounds",)),
     "search": lambda r, name: r.optional(name, ("InverseSettings",)),

@@ -1,4 +1,4 @@
-"""What inverses give back: one answer, and many."""
+"""Results of inverses: one answer, and many."""
 
 from __future__ import annotations
 
@@ -18,19 +18,16 @@ from tdcr.errors import NotConverged
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from tdcr._base.models import Settings
     from tdcr._core import (
         Bounds,
-        ConstantCurvatureSettings,
         InverseSettings,
-        LinkageSettings,
         Loads,
         Obstacle,
         Robot,
-        RodSettings,
         Shape,
     )
 
-    Settings: TypeAlias = RodSettings | LinkageSettings | ConstantCurvatureSettings
     Array: TypeAlias = NDArray[np.float64]
     Method: TypeAlias = Literal["newton", "pso"]
 
@@ -55,8 +52,8 @@ class Inverse(Saved, Value):
     no shape was found at all (`error` is NaN);
     iteration_limit, numerical_error: stopped before either."""
     message: str
-    """What stood in the way; empty when it converged, unless from rest the displacements lead to
-    another shape."""
+    """Reason why it did not converge; empty when it converged, unless from rest the displacements
+    lead to another shape."""
     error: float
     """Distance from the tool to the target, over the axes that count; the largest of a disk [m].
     NaN where no shape was found."""
@@ -72,7 +69,7 @@ class Inverse(Saved, Value):
     search: InverseSettings
     method: Method
     hits: int = 1
-    """How many starts led to this answer (`inverse_solutions`)."""
+    """Number of starts that led to this answer (`inverse_solutions`)."""
     obstacles: tuple[Obstacle, ...] = ()
     loads: Loads | None = None
     known_shape: Shape | None = None
@@ -82,7 +79,7 @@ class Inverse(Saved, Value):
 
     @property
     def ok(self) -> bool:
-        """Whether it converged."""
+        """True if it converged."""
         return self.status is Status.converged
 
     @cached_property
@@ -143,7 +140,7 @@ class InverseBatch(Saved, Value, Sequence[Inverse]):
     status: NDArray[Any]
     """`Status` of every row, (B,)."""
     ok: NDArray[np.bool_]
-    """Whether the row converged, (B,)."""
+    """True for rows that converged, (B,)."""
     error: Array
     """Distances to the targets, (B,) [m]."""
     rotation_error: Array

@@ -48,7 +48,7 @@ class Codec(NamedTuple):
     has_rows: bool = False
     """The table has a row per solve, which Parquet files are for."""
     instead: str = ""
-    """What to save as a table, where this is none."""
+    """Hint for a table, where this result is none."""
     robot: str = "its .robot is the robot"
     """Place of the robot, for a reader of robot files."""
     pack: Callable[[Any, Any], tuple[Columns, dict[str, str]]] | None = None

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tdcr._base.models import MODELS
 from tdcr._base.status import Status
 from tdcr._core import Robot
 from tdcr._io.plain_data import OBSTACLES, from_plain
@@ -16,7 +17,7 @@ from tdcr.errors import InvalidInput
 
 __all__ = ["FieldReader"]
 
-_SETTINGS = ("RodSettings", "LinkageSettings", "ConstantCurvatureSettings")
+_SETTINGS = tuple(settings.__name__ for settings in MODELS.values())
 _WORDS = {None: np.nan, "inf": np.inf, "-inf": -np.inf}
 _KINDS = {"f": "numbers", "i": "whole numbers", "u": "whole numbers", "b": "true or false"}
 
@@ -89,6 +90,9 @@ class FieldReader:
         if not isinstance(value, bool):
             raise self.fault(name, f"expected true or false, got {value!r}")
         return value
+
+    def model(self, name: str = "model") -> str:
+        return self.text(name, *MODELS)
 
     def settings(self, name: str = "settings") -> Any:
         """Give the settings of a model, or None."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tdcr import _core
+from tdcr._base.models import MODELS
 from tdcr._base.status import Status
 from tdcr._core import Contact, Robot, SignedDistance
 from tdcr.errors import InvalidInput
@@ -25,9 +26,9 @@ OBSTACLES = {
 # Arguments of them that are lengths or places; the others have no unit.
 LENGTHS = ("a", "b", "center", "half_extents", "point", "radius", "vertices")
 _SETTINGS = (
-    "ConstantCurvatureSettings", "InverseSettings", "LinkageSettings", "PrebendSettings",
-    "PsoSettings", "RodSettings", "RoutingSettings",
-)  # fmt: skip
+    *(settings.__name__ for settings in MODELS.values()),
+    *("InverseSettings", "PrebendSettings", "PsoSettings", "RoutingSettings"),
+)
 # All that files may name, likewise.
 _ARGUMENTS: dict[str, tuple[str, ...]] = {
     **OBSTACLES,
@@ -69,6 +70,7 @@ def to_plain(value: Any, name: str) -> Any:
             return {key: to_plain(one, f"{name}.{key}") for key, one in value.items()}
         case list() | tuple():
             return [to_plain(one, f"{name}[{i}]") for i, one in enumerate(value)]
+    # Objects, by the arguments of their constructors; anything else is plain.
     kind = type(value).__name__
     if kind not in _ARGUMENTS:
         return value

@@ -73,7 +73,7 @@ def _text(
         return f"expected {expected}, got {len(value)}"
     else:
         expected = _EXPECTED.get(kind, message) + _unit(data, parts, kind)
-    return f"expected {expected}, got {_shown(value)}"
+    return f"expected {expected}, got {_show(value)}"
 
 
 def _section(data: Any, parts: list[Any]) -> type[BaseModel]:
@@ -108,7 +108,7 @@ def _at(data: Any, parts: list[Any]) -> Any:
     return data
 
 
-def _shown(value: Any) -> str:
+def _show(value: Any) -> str:
     match value:
         case bool():
             return "true" if value else "false"

@@ -108,6 +108,7 @@ def plot_shape(
     ImportError
         matplotlib is not installed.
     """
+    # Options, and the plane of the picture.
     require_matplotlib()
     one_of("view", view, ("auto", "2d", "3d"))
     one_of("unit", unit, ("auto", "m", "mm"))
@@ -119,6 +120,7 @@ def plot_shape(
         from matplotlib import pyplot
 
         ax = axes_of(pyplot.figure(figsize=_SIZE, layout="constrained"), flat)
+    # From what lies behind to what lies in front.
     canvas = Flat(ax, plane, scene) if flat else Solid(ax, plane, scene)
     for obstacle in shape.obstacles if obstacles else ():
         canvas.obstacle(obstacle)
@@ -239,7 +241,7 @@ def _is_flat(
 
 
 def _lie_in(shape: Shape, plane: Plane, places: Points | None) -> bool:
-    """Whether marked places are in the plane too."""
+    """Tell if marked places are in the plane too."""
     if places is None:
         return True
     off = (places - shape.robot.base[:3, 3]) @ plane.normal

@@ -27,7 +27,7 @@ _LABELS = {
     "samples": "samples per voxel",
 }
 SIZE = (6.4, 4.8)
-"""Of a figure [in]."""
+"""Size of a figure [in]."""
 
 
 class Voxels(Protocol):
@@ -58,6 +58,7 @@ def plot_workspace(
 
     `measure` gives them once the options are checked; `name` is the title by default.
     """
+    # Options.
     require_matplotlib()
     one_of("value", value, tuple(_LABELS))
     one_of("unit", unit, ("auto", "m", "mm"))
@@ -66,6 +67,7 @@ def plot_workspace(
     solid = view == "3d" if ax is None else ax.name == "3d"
     if ax is not None and view is not None and solid != (view == "3d"):
         raise InvalidInput(f"view: expected what suits the Axes, {ax.name}, got {view!r}", "view")
+    # Voxels and backbone, in the unit of the axes.
     seen = measure(value)
     if ax is None:
         from matplotlib import pyplot
@@ -78,6 +80,7 @@ def plot_workspace(
     _spine(ax, robot, scale, solid)
     if solid:
         _finish(ax, robot, seen, scale)
+    # Labels, colour bar and title.
     ax.set_xlabel(f"x [{unit}]")
     if not solid:
         ax.set_ylabel(f"z [{unit}]")
@@ -128,7 +131,7 @@ def _section(ax: Any, seen: Voxels, scale: float) -> Any:
 
 
 def _few(seen: Voxels, some: Any, others: Any) -> bool:
-    """Whether some voxels hold next to none of the tips that they and others hold."""
+    """Tell if some voxels hold next to none of the tips that they and others hold."""
     return bool(10 * seen.counts[some].sum() < seen.counts[others].sum())
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tdcr._base.status import Status
-from tdcr._forward.codecs import MODELS, column
+from tdcr._forward.codecs import column
 from tdcr._io.codecs import Columns, Readers, register, value_codec
 from tdcr._io.field_reader import FieldReader
 from tdcr._io.plain_data import to_plain
@@ -52,7 +52,7 @@ _READERS: Readers = {
     "directions": lambda r, name: r.array(name, "B", 3),
     "codes": _codes,
     "values": _values,
-    "model": lambda r, name: r.text(name, *MODELS),
+    "model": FieldReader.model,
     "settings": FieldReader.settings,
     "obstacles": FieldReader.objects,
     "loads": lambda r, name: r.optional(name, ("Loads",)),
@@ -90,6 +90,7 @@ def _unpack(path: Any, table: Any) -> dict[str, Any]:
     from tdcr._io.robot_tables import build_robot
 
     shown, arrow = os.fspath(path), require_pyarrow()
+    # Fields of the header, with the shapes of further columns.
     header = parquet_header(path, table, "Workspace")
     if not isinstance(header.get("values"), dict):
         expected = f"{shown}: values: expected shapes by name"

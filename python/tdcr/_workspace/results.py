@@ -1,4 +1,4 @@
-"""What a sampled workspace tells: reach, volume, dexterity, manipulability."""
+"""Sampled workspaces: reach, volume, dexterity, manipulability."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from tdcr import _core
 from tdcr._base.arguments import whole
 from tdcr._base.status import Status
-from tdcr._base.value import Value, rebuilt
+from tdcr._base.value import Value, rebuild
 from tdcr._io.save_load import Saved
 from tdcr._workspace.manipulability import manipulability
 from tdcr._workspace.voxels import Grid, Volume, VoxelMap, default_voxel, solid_angles, volume
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from tdcr._base.models import Settings
     from tdcr._core import Loads, Obstacle, Robot, Shape
-    from tdcr._forward.batch import Settings
 
     Floats: TypeAlias = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ _STATUSES = tuple(Status)
 
 
 class Reach(NamedTuple):
-    """How far the tips get: distances from the base and the box around them."""
+    """Reach of the tips: distances from the base and the box around them."""
 
     nearest: float
     """Least distance from the centre of the base disk [m]."""
@@ -47,7 +47,7 @@ class Reach(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy with arrays that stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -62,7 +62,7 @@ class Workspace(Saved, Value):
     ranges: Floats
     """Least and greatest displacement of each tendon, (K, 2) [m]."""
     displacements: Floats
-    """Of each row, (m, K) [m]."""
+    """Displacements of each row, (m, K) [m]."""
     tips: Floats
     """Centre of the tip disk, (m, 3) [m]."""
     directions: Floats
@@ -82,18 +82,18 @@ class Workspace(Saved, Value):
 
     @property
     def status(self) -> NDArray[np.object_]:
-        """How each row ended, (m,) of Status."""
+        """Status of each row, (m,)."""
         return np.array(_STATUSES, object)[self.codes]
 
     @property
     def ok(self) -> NDArray[np.bool_]:
-        """Whether each row converged, (m,)."""
+        """True for rows that converged, (m,)."""
         converged: NDArray[np.bool_] = self.codes == _STATUSES.index(Status.converged)
         return converged
 
     @property
     def counts(self) -> dict[Status, int]:
-        """How many rows ended how, the most frequent first."""
+        """Number of rows by status, the most frequent first."""
         found = Counter(self.codes.tolist())
         return {_STATUSES[code]: count for code, count in found.most_common()}
 
@@ -278,10 +278,10 @@ class Workspace(Saved, Value):
 
         voxel = options.pop("voxel", None)
         return plot_workspace(
-            self.robot, lambda value: self._seen(value, voxel), name=self._title(), **options
+            self.robot, lambda value: self._voxel_map(value, voxel), name=self._title(), **options
         )
 
-    def _seen(self, value: str, voxel: float | None) -> VoxelMap:
+    def _voxel_map(self, value: str, voxel: float | None) -> VoxelMap:
         """Values per voxel in the frame of the base, where pictures cut sections."""
         base = self.robot.base
         turn, place = base[:3, :3], base[:3, 3]

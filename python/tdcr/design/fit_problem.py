@@ -1,4 +1,4 @@
-"""What a fit's parameters are: robots from values, predicted points, their derivatives."""
+"""Parameters of a fit as a vector: robots from values, predicted points, their derivatives."""
 
 from __future__ import annotations
 
@@ -271,10 +271,10 @@ class Problem:
                     if points == 1:
                         moments[disk] = np.cross(arm, axis)
                     gradient = at.adjoint(weights, moments)
-                    for name, slopes in self._chained(shape, given, gradient).items():
+                    for name, slopes in self._chain_rule(shape, given, gradient).items():
                         out[self._slices[name], row, j, c] = slopes
 
-    def _chained(self, shape: Shape, given: Array, by: Any) -> dict[str, Any]:
+    def _chain_rule(self, shape: Shape, given: Array, by: Any) -> dict[str, Any]:
         """Slopes by the values from those by all that a rod is made of."""
         robot = shape.robot
         found: dict[str, Any] = {}

@@ -12,7 +12,7 @@ from tdcr._base.status import Status
 from tdcr._base.value import Value
 from tdcr._core import Robot
 from tdcr._io.save_load import Saved
-from tdcr.design.fit_checks import checked, far_off, unsolved, whole
+from tdcr.design.fit_checks import check_problem, far_off, unsolved, whole
 from tdcr.design.measurements import Measurements
 from tdcr.errors import InvalidInput, NotConverged
 
@@ -47,11 +47,11 @@ class Fit(Saved, Value):
     """Values by name: "offset" (K,) [m], "gain" (K,), "radius" (K,) [m], "azimuth" (K,) [rad],
     "stiffness" (K,) [N], "poisson_ratio" (1,), "rest" (2,) [1/m], "base" (6,) [m, rad]."""
     standard_errors: dict[str, Array]
-    """Of each value, by the sandwich estimate; inf where the data do not tell it."""
+    """Standard error of each value, by the sandwich estimate; inf where the data do not tell it."""
     residuals: Array
     """Measured minus predicted positions, (rows, points, 3) [m]."""
     residuals_before: Array
-    """The same with the robot as it was given."""
+    """Residuals with the robot as it was given."""
     rows: NDArray[np.int64]
     """Indices of the kept rows in the measurements."""
     validation: NDArray[np.bool_]
@@ -64,20 +64,20 @@ class Fit(Saved, Value):
     status: Status
     """converged, or iteration_limit."""
     message: str
-    """Whether steps still fell; how many forward solves failed; whether the root mean square
+    """Says if steps still fell; how many forward solves failed; if the root mean square
     distance of the points fitted to is more than 10 times their median, which outliers make, or
     more than 5 % of the robot's length: then the model is not of these measurements. Empty if none
     of these."""
     iterations: int
     """Levenberg-Marquardt steps."""
     seed: int
-    """Of the split."""
+    """Seed of the split."""
 
     _hashed: ClassVar[tuple[str, ...]] = ("robot", "residuals", "seed")
 
     @property
     def ok(self) -> bool:
-        """Whether it converged."""
+        """True if it converged."""
         return self.status is Status.converged
 
     def require(self) -> Fit:
@@ -218,14 +218,16 @@ def fit(
     TypeError
         A value of another type.
     """
-    displacements, measurements = _paired(displacements, measurements)
-    problem, measured = checked(
+    # Arguments.
+    displacements, measurements = _pair(displacements, measurements)
+    problem, measured = check_problem(
         robot, displacements, measurements, parameters, model, settings, validation
     )
     if not isinstance(robust, bool):
         raise TypeError(f"robust: expected a bool, got {type(robust).__name__}")
     max_iterations = whole("max_iterations", max_iterations, 1)
     seed = whole("seed", seed, 0)
+    # Rows that are held out.
     count = len(measured.points)
     held = np.zeros(count, dtype=bool)
     order = np.random.default_rng(seed).permutation(count)
@@ -237,6 +239,7 @@ def fit(
             f"got {train.points.size}",
             "measurements",
         )
+    # Least squares, then the soft-L1 loss.
     values = problem.start()
     before, _ = problem.residuals(values, measured)
     values, iterations, done = _descend(problem, train, values, np.inf, max_iterations)
@@ -248,6 +251,7 @@ def fit(
         rest = max_iterations - iterations
         values, more, done = _descend(problem, train, values, scale, rest)
         iterations += more
+    # Standard errors, and what speaks against the fit.
     errors = _standard_errors(problem, train, values, scale)
     after, solved = problem.residuals(values, measured)
     status = Status.converged if done else Status.iteration_limit
@@ -275,7 +279,7 @@ def fit(
     )
 
 
-def _paired(
+def _pair(
     displacements: ArrayLike | None, measurements: ArrayLike | Measurements
 ) -> tuple[ArrayLike, ArrayLike]:
     """Give displacements and positions, of which measurements have both."""

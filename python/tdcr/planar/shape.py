@@ -34,7 +34,7 @@ class Trunk(Protocol):
         """Distance between the two cables [m]."""
 
     @property
-    def _given(self) -> tuple[Sequence[float], float]: ...
+    def _data(self) -> tuple[Sequence[float], float]: ...
 
     def __len__(self) -> int: ...
 
@@ -93,7 +93,7 @@ class PlanarShape(Value):
         InvalidInput
             Another shape, NaN, a radius that is not positive.
         """
-        return _core._planar_clearance(*self.trunk._given, self.turns, obstacles)
+        return _core._planar_clearance(*self.trunk._data, self.turns, obstacles)
 
     def curve(self, points: int = 50) -> Curve:
         """Sample the exact arcs: `points` on every section, its two ends included.
@@ -103,7 +103,7 @@ class PlanarShape(Value):
         InvalidInput
             Fewer than 2 points.
         """
-        rows = _core._planar_curve(*self.trunk._given, self.turns, points)
+        rows = _core._planar_curve(*self.trunk._data, self.turns, points)
         return Curve(rows[:, 0], rows[:, 1:3], rows[:, 3], 0.0)
 
     def angle(self, s: ArrayLike) -> Any:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from tdcr import _core
-from tdcr.planar.angle_function import frozen
+from tdcr.planar.angle_function import read_only
 from tdcr.planar.inverse import PlanarInverse, PlanarInverseBatch, Swarm, many, one
 from tdcr.planar.shape import PlanarShape
 
@@ -52,7 +52,7 @@ class PlanarTrunk:
         object.__setattr__(self, "cable_distance", distance)
 
     @property
-    def _given(self) -> tuple[Sequence[float], float]:
+    def _data(self) -> tuple[Sequence[float], float]:
         return self.lengths, self.cable_distance
 
     def __len__(self) -> int:
@@ -61,7 +61,7 @@ class PlanarTrunk:
 
     def __reduce__(self) -> tuple[type[PlanarTrunk], tuple[Any, ...]]:
         """Pickle through the constructor."""
-        return type(self), self._given
+        return type(self), self._data
 
     def forward(
         self, cable_lengths: ArrayLike, *, cables: Literal["chords", "arcs"] = "chords"
@@ -83,7 +83,7 @@ class PlanarTrunk:
             Another shape, lengths that are not positive, chords further apart than 2 d, an unknown
             reading.
         """
-        turns, misfit = _core._planar_turns(*self._given, cable_lengths, cables)
+        turns, misfit = _core._planar_turns(*self._data, cable_lengths, cables)
         return self._shape(turns, misfit)
 
     def shape(self, turns: ArrayLike) -> PlanarShape:
@@ -97,8 +97,8 @@ class PlanarTrunk:
         return self._shape(turns, None)
 
     def _shape(self, turns: ArrayLike, misfit: Array | None) -> PlanarShape:
-        positions, headings = _core._planar_platforms(*self._given, turns)
-        return PlanarShape(self, frozen(np.atleast_1d(turns)), positions, headings, misfit)
+        positions, headings = _core._planar_platforms(*self._data, turns)
+        return PlanarShape(self, read_only(np.atleast_1d(turns)), positions, headings, misfit)
 
     def cable_lengths(
         self, turns: ArrayLike, *, cables: Literal["chords", "arcs"] = "chords"
@@ -111,7 +111,7 @@ class PlanarTrunk:
             Turns that do not fit, chords turned by more than pi, a turn that leaves a cable no
             length, an unknown reading.
         """
-        answer: Array = _core._planar_cable_lengths(*self._given, turns, cables)
+        answer: Array = _core._planar_cable_lengths(*self._data, turns, cables)
         return answer
 
     def inverse(

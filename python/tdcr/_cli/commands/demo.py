@@ -51,7 +51,7 @@ def demo(files: Path | None, output: Path | None) -> int:
         with resources.as_file(resource) as path:
             robot = Robot.load(path)
         shapes.append(tdcr.forward(robot, displacements))
-        times.append(min(_timed(robot, displacements) for _ in range(10)))
+        times.append(min(_time(robot, displacements) for _ in range(10)))
     report.print_demo(shapes, times)
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
@@ -76,7 +76,7 @@ def _write_files(folder: Path) -> None:
         click.echo(f"written: {folder / name}")
 
 
-def _timed(robot: Robot, displacements: Sequence[float]) -> float:
+def _time(robot: Robot, displacements: Sequence[float]) -> float:
     start = perf_counter()
     tdcr.forward(robot, displacements)
     return perf_counter() - start

@@ -43,7 +43,7 @@ def design() -> None:
     """Find the robot that takes a wanted shape."""
 
 
-def _wanted(robot: Robot, target: Path, unit: str | None, curve: bool) -> tuple[Any, str]:
+def _read_places(robot: Robot, target: Path, unit: str | None, curve: bool) -> tuple[Any, str]:
     """Places of disks from a file, and the unit of the table."""
     places, unit = read_targets(target, unit)
     count = robot.backbone.count
@@ -60,7 +60,7 @@ def _wanted(robot: Robot, target: Path, unit: str | None, curve: bool) -> tuple[
     return places, unit
 
 
-def _done(found: Any, unit: str, json_file: str | None, files: tuple[str | None, ...]) -> int:
+def _finish(found: Any, unit: str, json_file: str | None, files: tuple[str | None, ...]) -> int:
     from tdcr._cli.report import results as report
 
     output, plot_file = files
@@ -106,9 +106,9 @@ def prebend(
 
     check_picture(plot_file)
     arm = Robot.load(robot)
-    places, unit = _wanted(arm, target, unit, curve)
+    places, unit = _read_places(arm, target, unit, curve)
     found = solve(arm, places, to_metres(displacements, unit))
-    return _done(found, unit, json_file, (output, plot_file))
+    return _finish(found, unit, json_file, (output, plot_file))
 
 
 @design.command(
@@ -152,8 +152,8 @@ def routing(
 
     check_picture(plot_file)
     arm = Robot.load(robot)
-    places, unit = _wanted(arm, target, unit, curve)
+    places, unit = _read_places(arm, target, unit, curve)
     limits = None if bounds is None else tuple(to_metres(bounds, unit))
     settings = RoutingSettings(holes=holes or None)
     found = solve(arm, places, bounds=limits, settings=settings)  # type: ignore[arg-type]
-    return _done(found, unit, json_file, (output, plot_file))
+    return _finish(found, unit, json_file, (output, plot_file))

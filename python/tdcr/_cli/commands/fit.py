@@ -105,6 +105,7 @@ def fit(
     from tdcr._plot.shape import save_figure
     from tdcr.design import fit as solve
 
+    # Measurements, with a column for every tendon.
     check_picture(plot_file)
     arm = Robot.load(robot)
     unit = options["unit"]
@@ -125,6 +126,7 @@ def fit(
             f"got {', '.join(columns)}; name them with --displacement-columns",
             "displacements",
         )
+    # The sign of pulls.
     slack = not (measured.displacements < 0.0).any()
     if slack and options["model"] == "rod" and "offset" not in parameters:
         # Slack tendons tell nothing: the parameters would stay what they were.
@@ -133,6 +135,7 @@ def fit(
         raise InvalidInput(message, "pull_sign")
     for doubt in doubts:
         warn(doubt.message)
+    # The fit, and its files and table.
     found = solve(
         arm,
         measured,

@@ -8,6 +8,7 @@ import click
 
 import tdcr
 from tdcr import Robot
+from tdcr._base.models import MODELS
 from tdcr._cli.click_types import Command
 from tdcr._cli.options import (
     ROBOT,
@@ -48,7 +49,7 @@ __all__ = ["forward", "schema"]
 )
 @ROBOT
 @displacements_option()
-@model_option("rod", "linkage", "constant_curvature")
+@model_option(*MODELS)
 @unit_option("the displacements")
 @obstacles_option
 @json_option

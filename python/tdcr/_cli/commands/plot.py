@@ -11,6 +11,7 @@ import numpy as np
 
 import tdcr
 from tdcr import Grasp, InvalidInput, InverseBatch, Robot, Shape, ShapeBatch, Workspace
+from tdcr._base.models import MODELS
 from tdcr._cli.click_types import Command
 from tdcr._cli.options import FILE, displacements_option, examples, model_option, unit_option
 from tdcr._cli.output import (
@@ -51,7 +52,7 @@ __all__ = ["plot"]
     help="Of a robot: a GIF of the pull, from rest.",
 )
 @displacements_option(required=False)
-@model_option("rod", "linkage", "constant_curvature")
+@model_option(*MODELS)
 @unit_option("the displacements")
 @click.option(
     "--view",
@@ -89,11 +90,12 @@ def plot(
     if output is None and animate is None:
         raise click.UsageError("expected --output FILE, --animate FILE or both")
     check_picture(output)
+    # A robot or a result, and options that suit it.
     thing = _read(file)
     if not isinstance(thing, Robot) and (displacements is not None or animate is not None):
         got = f"{file} with a {type(thing).__name__}"
         raise click.UsageError(f"--pull and --animate: expected a robot file, got {got}")
-    _used(context, thing)
+    _check_options(context, thing)
     if isinstance(thing, Workspace):
         save_workspace_picture(thing, str(output), "3d" if view == "3d" else "section")
         return 0
@@ -102,6 +104,7 @@ def plot(
 
         save_drawing(lambda ax: thing.plot(ax=ax), str(output), flat=isinstance(thing, Fit))
         return 0
+    # Shapes, of a robot solved now.
     pulls = None if displacements is None else to_metres(displacements, unit)
     if animate is not None:
         _animate(thing, pulls, model, animate, frames)
@@ -114,7 +117,7 @@ def plot(
     return report_outcome(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
 
 
-def _used(context: click.Context, thing: Any) -> None:
+def _check_options(context: click.Context, thing: Any) -> None:
     """Refuse options that would be without use."""
     given = {
         name
@@ -164,7 +167,7 @@ def _shape(thing: Any, pulls: list[float] | None, model: str, row: int | None) -
 
 
 def _animate(robot: Robot, pulls: list[float] | None, model: str, path: str, frames: int) -> None:
-    from tdcr._base.progress import told
+    from tdcr._base.progress import progress_callback
     from tdcr._plot.animation import animate_pull, check_gif, pulled_shapes
 
     if pulls is None:
@@ -172,7 +175,7 @@ def _animate(robot: Robot, pulls: list[float] | None, model: str, path: str, fra
     check_gif(path)
     # Checked as a whole before the first step.
     tdcr.forward(robot, pulls, model=model)
-    with told(shows_progress(), "plot", 2 * frames) as tell:
+    with progress_callback(shows_progress(), "plot", 2 * frames) as tell:
         shapes = pulled_shapes(robot, np.array(pulls), model=model, count=frames, progress=tell)
         shown = None if tell is None else (lambda done: tell(frames + done))
         animate_pull(shapes, path, progress=shown)

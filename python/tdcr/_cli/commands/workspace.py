@@ -9,6 +9,7 @@ import click
 
 import tdcr
 from tdcr import Robot
+from tdcr._base.models import MODELS
 from tdcr._cli.click_types import Command, Numbers, read_numbers
 from tdcr._cli.options import (
     ROBOT,
@@ -78,7 +79,7 @@ def _ranges(
     help="How displacements are drawn; sobol needs scipy.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of sobol and random.")
-@model_option("rod", "linkage", "constant_curvature")
+@model_option(*MODELS)
 @unit_option("the ranges")
 @obstacles_option
 @json_option
@@ -115,6 +116,7 @@ def workspace(
     limits = [tuple(to_metres(pair, unit)) for pair in ranges]
     if all(pair == (inf, inf) for pair in limits):
         raise click.BadParameter("expected a tendon that is not free", param_hint="--ranges")
+    # Samples, and their files and table.
     found = tdcr.workspace(
         arm,
         limits,

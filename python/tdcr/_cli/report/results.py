@@ -48,14 +48,14 @@ _UNITS = {
 _BASE = ("x [m]", "y [m]", "z [m]", "about x [rad]", "about y [rad]", "about z [rad]")
 
 
-def _scaled(unit: str) -> tuple[float, int]:
+def _scale_of(unit: str) -> tuple[float, int]:
     """Scale and digits of lengths in a unit."""
     return (1000.0, 3) if unit == "mm" else (1.0, 6)
 
 
 def _length(value: float, unit: str) -> str:
     """Format a length: small ones with three digits that count, rounding errors as such."""
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     if value < _NOTHING:
         return f"below {_NOTHING * scale:.0e}"
     value = value * scale
@@ -68,7 +68,7 @@ def _name(robot: Robot) -> tuple[str, str]:
 
 def _pulls(console: Any, robot: Robot, unit: str, displacements: Any, tensions: Any) -> Any:
     """Table of what each tendon does."""
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     known = bool(np.isfinite(tensions).any())
     spine = robot.backbone
     least = _NOTHING * np.abs(tensions).max(initial=0.0)
@@ -110,7 +110,7 @@ def track_json(found: InverseBatch) -> str:
 def print_inverse(answer: Inverse, unit: str) -> None:
     """Print an inverse: how near it comes, and what each tendon does."""
     console = console_of()
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     frame = answer.target.ndim == 2
     place = answer.target[:3, 3] if frame else answer.target
     facts = [
@@ -134,7 +134,7 @@ def print_inverse(answer: Inverse, unit: str) -> None:
 def print_track(found: InverseBatch, unit: str) -> None:
     """Print how a path was followed, and where worst."""
     console = console_of()
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     pulls = found.displacements * scale
     restarted = int(np.count_nonzero(found.starts > 1))
     low, high = pulls.min(axis=0), pulls.max(axis=0)
@@ -191,7 +191,7 @@ def workspace_json(found: Workspace) -> str:
 def print_workspace(found: Workspace, unit: str) -> None:
     """Print reach and volume."""
     console = console_of()
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     facts = _workspace_facts(found)
     rows = [
         _name(found.robot),
