@@ -16,6 +16,8 @@ from io import TextIOWrapper
 import click
 
 from tdcr import InvalidInput, __version__
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Commands, Interrupted, Unread
 from tdcr._cli.commands.demo import demo
 from tdcr._cli.commands.design import design
@@ -24,8 +26,6 @@ from tdcr._cli.commands.forward import forward, schema
 from tdcr._cli.commands.inverse import inverse, track
 from tdcr._cli.commands.plot import plot
 from tdcr._cli.commands.workspace import workspace
-from tdcr._cli.options import examples
-from tdcr._cli.output import warn
 
 __all__ = ["main"]
 
@@ -69,7 +69,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     """Run the command and say what went wrong."""
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = lambda message, *_, **__: warn(message)
+            warnings.showwarning = lambda message, *_, **__: out.warn(message)
             return int(_group.main(arguments, prog_name="tdcr", standalone_mode=False) or 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
@@ -126,7 +126,7 @@ def _refuse(message: str) -> int:
     "tdcr",
     cls=Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog=examples(
+    epilog=options.examples(
         "demo --files .",
         "forward trunk.toml -d -15 free free free -5 free --unit mm",
         files=False,

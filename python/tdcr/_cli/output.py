@@ -27,7 +27,7 @@ __all__ = [
     "picture_of",
     "report_outcome",
     "report_rows",
-    "save_workspace_picture",
+    "save_workspace",
     "shows_progress",
     "warn",
     "write_text",
@@ -132,7 +132,7 @@ def picture_of(shape: Shape, marks: NDArray[Any] | None = None) -> Callable[[str
     return save
 
 
-def save_workspace_picture(found: Workspace, path: str, view: str) -> None:
+def save_workspace(found: Workspace, path: str, view: str) -> None:
     """Write the picture of a workspace."""
     from tdcr._plot.shape import save_drawing
     from tdcr._plot.workspace import SIZE

@@ -12,8 +12,8 @@ import click
 
 import tdcr
 from tdcr import Robot
-from tdcr._cli.options import examples
-from tdcr._cli.output import check_picture, picture_of, report_outcome, write_text
+from tdcr._cli import options
+from tdcr._cli import output as out
 
 __all__ = ["demo"]
 
@@ -24,7 +24,9 @@ DEMO = (
 )
 
 
-@click.command("demo", epilog=examples("demo --files .", "demo --output pictures", files=False))
+@click.command(
+    "demo", epilog=options.examples("demo --files .", "demo --output pictures", files=False)
+)
 @click.option(
     "--files",
     type=click.Path(file_okay=False, path_type=Path),
@@ -41,7 +43,7 @@ def demo(files: Path | None, output: Path | None) -> int:
     """Solve the bundled robots and print where their tips are (position, rotation vector)."""
     from tdcr._cli.report import shape as report
 
-    check_picture(None if output is None else "robot.png")
+    out.check_picture(None if output is None else "robot.png")
     if files is not None:
         _write_files(files)
         return 0
@@ -56,9 +58,9 @@ def demo(files: Path | None, output: Path | None) -> int:
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
         for (name, _), shape in zip(DEMO, shapes, strict=True):
-            picture_of(shape)(str(output / f"{name}.png"))
+            out.picture_of(shape)(str(output / f"{name}.png"))
             click.echo(f"picture: {output / name}.png")
-    return max(report_outcome(s.ok, s.robot.name, s.status, s.message) for s in shapes)
+    return max(out.report_outcome(s.ok, s.robot.name, s.status, s.message) for s in shapes)
 
 
 def _write_files(folder: Path) -> None:
@@ -72,7 +74,7 @@ def _write_files(folder: Path) -> None:
             raise click.UsageError(f"{path}: expected no such file, or the one of the examples")
     folder.mkdir(parents=True, exist_ok=True)
     for name in sorted(texts):
-        write_text(str(folder / name), texts[name])
+        out.write_text(str(folder / name), texts[name])
         click.echo(f"written: {folder / name}")
 
 

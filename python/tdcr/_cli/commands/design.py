@@ -8,25 +8,17 @@ from typing import Any
 import click
 
 from tdcr import InvalidInput, Robot, RoutingSettings
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command, Commands
-from tdcr._cli.options import (
-    BOUNDS,
-    FILE,
-    ROBOT,
-    displacements_option,
-    examples,
-    json_option,
-    output_option,
-    picture_option,
-    read_targets,
-    target_option,
-)
-from tdcr._cli.output import check_picture, deliver, picture_of, report_outcome
 from tdcr._io.lengths import to_metres
 
 __all__ = ["design"]
 
-_TARGET = click.argument("target", type=FILE)
+_EXAMPLE = options.examples(
+    "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
+)
+_TARGET = click.argument("target", type=options.FILE)
 _CURVE = click.option(
     "--curve",
     is_flag=True,
@@ -37,7 +29,9 @@ _CURVE = click.option(
 @click.group(
     "design",
     cls=Commands,
-    epilog=examples("design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"),
+    epilog=options.examples(
+        "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
+    ),
 )
 def design() -> None:
     """Find the robot that takes a wanted shape."""
@@ -45,7 +39,7 @@ def design() -> None:
 
 def _read_places(robot: Robot, target: Path, unit: str | None, curve: bool) -> tuple[Any, str]:
     """Places of disks from a file, and the unit of the table."""
-    places, unit = read_targets(target, unit)
+    places, unit = options.read_targets(target, unit)
     count = robot.backbone.count
     if curve:
         from tdcr.design import on_curve
@@ -64,29 +58,31 @@ def _finish(found: Any, unit: str, json_file: str | None, files: tuple[str | Non
     from tdcr._cli.report import results as report
 
     output, plot_file = files
-    deliver(
+    out.deliver(
         lambda: report.design_json(found),
         lambda: report.print_design(found, unit),
         json_file,
         (output, found.robot.save),
-        (plot_file, picture_of(found.shape, found.target_positions)),
+        (plot_file, out.picture_of(found.shape, found.target_positions)),
     )
-    return report_outcome(found.ok, found.robot.name, found.status, found.message)
+    return out.report_outcome(found.ok, found.robot.name, found.status, found.message)
 
 
 @design.command(
     "prebend",
     cls=Command,
-    epilog=examples("design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"),
+    epilog=options.examples(
+        "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
+    ),
 )
-@ROBOT
+@options.ROBOT
 @_TARGET
-@displacements_option()
+@options.displacements_option()
 @_CURVE
-@target_option
-@json_option
-@picture_option
-@output_option("the robot with its new rest shape", ".toml", ".json")
+@options.target_option
+@options.json_option
+@options.picture_option
+@options.output_option("the robot with its new rest shape", ".toml", ".json")
 def prebend(
     robot: Path,
     target: Path,
@@ -104,7 +100,7 @@ def prebend(
     """
     from tdcr.design import prebend as solve
 
-    check_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
     places, unit = _read_places(arm, target, unit, curve)
     found = solve(arm, places, to_metres(displacements, unit))
@@ -114,11 +110,11 @@ def prebend(
 @design.command(
     "routing",
     cls=Command,
-    epilog=examples(
+    epilog=options.examples(
         "design routing finger.toml places.csv --holes 12 --bounds -10 0 --output routed.toml"
     ),
 )
-@ROBOT
+@options.ROBOT
 @_TARGET
 @click.option(
     "--holes",
@@ -127,12 +123,12 @@ def prebend(
     show_default=True,
     help="Holes per disk, evenly spaced; 0 allows any azimuth.",
 )
-@BOUNDS
+@options.BOUNDS
 @_CURVE
-@target_option
-@json_option
-@picture_option
-@output_option("the robot with its new routing", ".toml", ".json")
+@options.target_option
+@options.json_option
+@options.picture_option
+@options.output_option("the robot with its new routing", ".toml", ".json")
 def routing(
     robot: Path,
     target: Path,
@@ -150,7 +146,7 @@ def routing(
     """
     from tdcr.design import routing as solve
 
-    check_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
     places, unit = _read_places(arm, target, unit, curve)
     limits = None if bounds is None else tuple(to_metres(bounds, unit))

@@ -9,30 +9,9 @@ import click
 
 import tdcr
 from tdcr import InvalidInput, Robot
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command, Numbers
-from tdcr._cli.options import (
-    BOUNDS,
-    FILE,
-    ROBOT,
-    examples,
-    json_option,
-    model_option,
-    obstacles_option,
-    output_option,
-    picture_option,
-    read_targets,
-    target_option,
-    unit_option,
-)
-from tdcr._cli.output import (
-    check_picture,
-    deliver,
-    doubt_unit,
-    picture_of,
-    report_outcome,
-    report_rows,
-    shows_progress,
-)
 from tdcr._io.lengths import to_metres
 from tdcr._io.obstacle_file import read_obstacles
 
@@ -42,12 +21,12 @@ __all__ = ["inverse", "track"]
 @click.command(
     "inverse",
     cls=Command,
-    epilog=examples(
+    epilog=options.examples(
         "inverse trunk.toml --position 60 20 170 --unit mm",
         "inverse trunk.toml --position 0 0 0.2 --rotation 0 0 0 --model constant_curvature",
     ),
 )
-@ROBOT
+@options.ROBOT
 @click.option(
     "--position",
     cls=Numbers,
@@ -64,17 +43,17 @@ __all__ = ["inverse", "track"]
 )
 @click.option(
     "--pose",
-    type=FILE,
+    type=options.FILE,
     metavar="FILE",
     help="Instead: the 4x4 frame of the tool by rows, numbers with commas or spaces between them.",
 )
-@model_option("rod", "constant_curvature")
-@BOUNDS
-@unit_option("the position, the bounds, the last column of a pose")
-@obstacles_option
-@json_option
-@picture_option
-@output_option("the answer", ".npz", ".json")
+@options.model_option("rod", "constant_curvature")
+@options.BOUNDS
+@options.unit_option("the position, the bounds, the last column of a pose")
+@options.obstacles_option
+@options.json_option
+@options.picture_option
+@options.output_option("the answer", ".npz", ".json")
 def inverse(
     robot: Path,
     position: list[float] | None,
@@ -93,7 +72,7 @@ def inverse(
 
     if (position is None) == (pose is None) or (pose is not None and rotation is not None):
         raise click.UsageError("expected --position X Y Z, with or without --rotation, or --pose")
-    check_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
     target = _pose(pose, unit) if pose is not None else _target(position, rotation, unit)
     answer = tdcr.inverse(
@@ -104,15 +83,15 @@ def inverse(
         obstacles=read_obstacles(obstacles),
     )
     marks = answer.target[None, :3, 3] if answer.target.ndim == 2 else answer.target[None]
-    deliver(
+    out.deliver(
         lambda: report.inverse_json(answer),
         lambda: report.print_inverse(answer, unit),
         json_file,
         (output, answer.save),
-        (plot_file, lambda path: picture_of(answer.shape, marks)(path)),
+        (plot_file, lambda path: out.picture_of(answer.shape, marks)(path)),
     )
-    doubt = doubt_unit(unit, answer.error, arm, times=20)
-    return report_outcome(answer.ok, arm.name, answer.status, answer.message + doubt)
+    doubt = out.doubt_unit(unit, answer.error, arm, times=20)
+    return out.report_outcome(answer.ok, arm.name, answer.status, answer.message + doubt)
 
 
 def _bounds(bounds: list[float] | None, unit: str) -> Any:
@@ -151,23 +130,23 @@ def _pose(path: Path, unit: str) -> Any:
 @click.command(
     "track",
     cls=Command,
-    epilog=examples("track trunk.toml path.csv --output pulls.csv"),
+    epilog=options.examples("track trunk.toml path.csv --output pulls.csv"),
 )
-@ROBOT
-@click.argument("path", type=FILE)
-@model_option("rod", "constant_curvature")
-@BOUNDS
-@target_option
+@options.ROBOT
+@click.argument("path", type=options.FILE)
+@options.model_option("rod", "constant_curvature")
+@options.BOUNDS
+@options.target_option
 @click.option(
     "--step",
     type=float,
     metavar="LENGTH",
     help="Go from point to point in straight lines, by at most so much in a row, in --unit.",
 )
-@obstacles_option
-@json_option
-@picture_option
-@output_option("the pulls of every row", ".csv", ".npz", ".json", ".parquet")
+@options.obstacles_option
+@options.json_option
+@options.picture_option
+@options.output_option("the pulls of every row", ".csv", ".npz", ".json", ".parquet")
 def track(
     robot: Path,
     path: Path,
@@ -187,9 +166,9 @@ def track(
     """
     from tdcr._cli.report import results as report
 
-    check_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
-    targets, unit = read_targets(path, unit)
+    targets, unit = options.read_targets(path, unit)
     if step is not None:
         targets = tdcr.cartesian_path(targets, *to_metres([step], unit))
     found = tdcr.track(
@@ -198,13 +177,13 @@ def track(
         model=model,
         bounds=_bounds(bounds, unit),
         obstacles=read_obstacles(obstacles),
-        progress=shows_progress(),
+        progress=out.shows_progress(),
     )
-    deliver(
+    out.deliver(
         lambda: report.track_json(found),
         lambda: report.print_track(found, unit),
         json_file,
         (output, found.save),
-        (plot_file, lambda path: picture_of(found[-1].shape, targets)(path)),
+        (plot_file, lambda path: out.picture_of(found[-1].shape, targets)(path)),
     )
-    return report_rows(found, doubt_unit(unit, float(found.error.max()), arm, times=20))
+    return out.report_rows(found, out.doubt_unit(unit, float(found.error.max()), arm, times=20))

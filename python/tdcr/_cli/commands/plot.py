@@ -12,17 +12,9 @@ import numpy as np
 import tdcr
 from tdcr import Grasp, InvalidInput, InverseBatch, Robot, Shape, ShapeBatch, Workspace
 from tdcr._base.models import MODELS
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command
-from tdcr._cli.options import FILE, displacements_option, examples, model_option, unit_option
-from tdcr._cli.output import (
-    check_picture,
-    check_writable,
-    doubt_unit,
-    largest_size,
-    report_outcome,
-    save_workspace_picture,
-    shows_progress,
-)
 from tdcr._io.lengths import to_metres
 from tdcr.design import Fit
 
@@ -32,28 +24,28 @@ __all__ = ["plot"]
 @click.command(
     "plot",
     cls=Command,
-    epilog=examples(
+    epilog=options.examples(
         "plot trunk.toml --pull -15 free free free -5 free --unit mm --output pulled.png",
         "plot trunk.toml --pull -15 free free free -9 free --unit mm --animate pull.gif",
     ),
 )
-@click.argument("file", type=FILE)
+@click.argument("file", type=options.FILE)
 @click.option(
     "-o",
     "--output",
-    callback=check_writable,
+    callback=out.check_writable,
     metavar="FILE",
     help="The picture: .png, .pdf, .svg, ...",
 )
 @click.option(
     "--animate",
-    callback=check_writable,
+    callback=out.check_writable,
     metavar="FILE",
     help="Of a robot: a GIF of the pull, from rest.",
 )
-@displacements_option(required=False)
-@model_option(*MODELS)
-@unit_option("the displacements")
+@options.displacements_option(required=False)
+@options.model_option(*MODELS)
+@options.unit_option("the displacements")
 @click.option(
     "--view",
     type=click.Choice(["auto", "2d", "3d"]),
@@ -88,8 +80,8 @@ def plot(
     workspaces, designs, fits and grasps (.npz, .json, of workspaces .parquet).
     """
     if output is None and animate is None:
-        raise click.UsageError("expected --output FILE, --animate FILE or both")
-    check_picture(output)
+        raise click.UsageError("expected --output options.FILE, --animate options.FILE or both")
+    out.check_picture(output)
     # A robot or a result, and options that suit it.
     thing = _read(file)
     if not isinstance(thing, Robot) and (displacements is not None or animate is not None):
@@ -97,7 +89,7 @@ def plot(
         raise click.UsageError(f"--pull and --animate: expected a robot file, got {got}")
     _check_options(context, thing)
     if isinstance(thing, Workspace):
-        save_workspace_picture(thing, str(output), "3d" if view == "3d" else "section")
+        out.save_workspace(thing, str(output), "3d" if view == "3d" else "section")
         return 0
     if isinstance(thing, (Fit, Grasp)):
         from tdcr._plot.shape import save_drawing
@@ -113,8 +105,8 @@ def plot(
         from tdcr._plot.shape import save_picture
 
         save_picture(shape, output, view=view)
-    doubt = doubt_unit(unit, largest_size(pulls or ()), shape.robot)
-    return report_outcome(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
+    doubt = out.doubt_unit(unit, out.largest_size(pulls or ()), shape.robot)
+    return out.report_outcome(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
 
 
 def _check_options(context: click.Context, thing: Any) -> None:
@@ -132,7 +124,7 @@ def _check_options(context: click.Context, thing: Any) -> None:
     if "unit" in given and context.params["displacements"] is None:
         raise click.UsageError("--unit: expected --pull too")
     if "frames" in given and context.params["animate"] is None:
-        raise click.UsageError("--frames: expected --animate FILE too")
+        raise click.UsageError("--frames: expected --animate options.FILE too")
 
 
 def _read(file: Path) -> Any:
@@ -175,7 +167,7 @@ def _animate(robot: Robot, pulls: list[float] | None, model: str, path: str, fra
     check_gif(path)
     # Checked as a whole before the first step.
     tdcr.forward(robot, pulls, model=model)
-    with progress_callback(shows_progress(), "plot", 2 * frames) as tell:
+    with progress_callback(out.shows_progress(), "plot", 2 * frames) as tell:
         shapes = pulled_shapes(robot, np.array(pulls), model=model, count=frames, progress=tell)
         shown = None if tell is None else (lambda done: tell(frames + done))
         animate_pull(shapes, path, progress=shown)

@@ -10,26 +10,9 @@ import click
 import tdcr
 from tdcr import Robot
 from tdcr._base.models import MODELS
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command, Numbers, read_numbers
-from tdcr._cli.options import (
-    ROBOT,
-    examples,
-    json_option,
-    model_option,
-    obstacles_option,
-    output_option,
-    picture_option,
-    unit_option,
-)
-from tdcr._cli.output import (
-    check_picture,
-    deliver,
-    doubt_unit,
-    largest_size,
-    report_rows,
-    save_workspace_picture,
-    shows_progress,
-)
 from tdcr._io.lengths import to_metres
 from tdcr._io.obstacle_file import read_obstacles
 
@@ -55,12 +38,12 @@ def _ranges(
 @click.command(
     "workspace",
     cls=Command,
-    epilog=examples(
+    epilog=options.examples(
         "workspace trunk.toml --ranges -10:0 free free free -6:0 free --unit mm "
         "--samples 2000 --sampling random --output cloud.npz"
     ),
 )
-@ROBOT
+@options.ROBOT
 @click.option(
     "--ranges",
     cls=Numbers,
@@ -79,11 +62,11 @@ def _ranges(
     help="How displacements are drawn; sobol needs scipy.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of sobol and random.")
-@model_option(*MODELS)
-@unit_option("the ranges")
-@obstacles_option
-@json_option
-@picture_option
+@options.model_option(*MODELS)
+@options.unit_option("the ranges")
+@options.obstacles_option
+@options.json_option
+@options.picture_option
 @click.option(
     "--view",
     type=click.Choice(["section", "3d"]),
@@ -91,7 +74,7 @@ def _ranges(
     show_default=True,
     help="Of the picture.",
 )
-@output_option("the samples", ".npz", ".json", ".csv", ".parquet")
+@options.output_option("the samples", ".npz", ".json", ".csv", ".parquet")
 def workspace(
     robot: Path,
     ranges: list[tuple[float, float]],
@@ -109,7 +92,7 @@ def workspace(
     """Sample where the tip of the robot in file ROBOT gets."""
     from tdcr._cli.report import results as report
 
-    check_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
     if len(ranges) == 1:
         ranges = ranges * len(arm.tendons)
@@ -125,16 +108,19 @@ def workspace(
         seed=seed,
         model=model,
         obstacles=read_obstacles(obstacles),
-        progress=shows_progress(),
+        progress=out.shows_progress(),
     )
     nothing = plot_file is not None and not found.ok.any()
-    deliver(
+    out.deliver(
         lambda: report.workspace_json(found),
         lambda: report.print_workspace(found, unit),
         json_file,
         (output, found.save),
-        (None if nothing else plot_file, lambda path: save_workspace_picture(found, path, view)),
+        (
+            None if nothing else plot_file,
+            lambda path: out.save_workspace(found, path, view),
+        ),
     )
-    longest = largest_size(end for pair in limits for end in pair)
-    doubt = doubt_unit(unit, longest, arm)
-    return report_rows(found, "; no picture" * nothing + doubt)
+    longest = out.largest_size(end for pair in limits for end in pair)
+    doubt = out.doubt_unit(unit, longest, arm)
+    return out.report_rows(found, "; no picture" * nothing + doubt)
