@@ -150,7 +150,7 @@ DESIGNS = {
     "fit without validation": lambda: fit(validation=0.0),
     "grasp": grasp,
     "grasp of a finger": lambda: tdcr.Grasp(
-        np.array([1.0]), ((tdcr.forward(straight(), [0, 0, 0]),),)
+        grasp().shares[-1:], ((tdcr.forward(straight(), [0, 0, 0]),),)
     ),
 }
 

@@ -43,8 +43,8 @@ def rebuild(kind: Any, *values: Any) -> Any:
 def _read_only(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         value.flags.writeable = False
-    if isinstance(value, list):
-        return [_read_only(item) for item in value]
+    if type(value) in (list, tuple):
+        return type(value)(_read_only(item) for item in value)
     if isinstance(value, dict):
         return {name: _read_only(item) for name, item in value.items()}
     return value
