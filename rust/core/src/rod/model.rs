@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix6xX, Vector3};
 
 use super::degenerate_rest;
 use super::dual_newton::{DualNewton, Ending};
@@ -70,67 +70,6 @@ impl<'r> Rod<'r> {
     #[must_use]
     pub fn rest_lengths(&self) -> &[f64] {
         &self.plan.rest_lengths
-    }
-
-    /// Displacements under which a shape has the lengths and tensions that it has, `L − c T − L_rest` \[m\].
-    #[must_use]
-    pub fn displacements(&self, state: &State) -> Vec<f64> {
-        let plan = self.plan;
-        let rows = state.tendon_lengths.iter().zip(&state.tensions);
-        let plans = plan.rest_lengths.iter().zip(&plan.compliance);
-        let change = |((own, tension), (rest, compliance)): ((&f64, &f64), (&f64, &f64))| {
-            own - compliance * tension / plan.unit - rest
-        };
-        rows.zip(plans).map(change).collect()
-    }
-
-    /// Shape under given tensions, in the unit of the results: displacements follow from it. It is a minimum
-    /// reachable from rest as the tensions grow together; infeasible beyond where that path ends.
-    ///
-    /// # Errors
-    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
-    pub fn solve_tensions(
-        &self,
-        tensions: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        let expected = "sliding tendons where tensions are given";
-        self.plan.settings.tendons.require_tensions("tendons", expected)?;
-        self.plan.check_tensions(tensions)?;
-        let mut budget = self.plan.settings.max_iterations;
-        self.share_stop(work);
-        let Scratch { system, load_stepping, .. } = work;
-        system.reset(self.plan);
-        system.clear_bounds(self.plan);
-        system.active.clear();
-        system.active.extend(tensions.iter().map(|tension| *tension > 0.0));
-        let target = tensions.iter().map(|tension| tension / self.plan.unit);
-        let limits = Limits {
-            newton_steps: NEWTON_STEPS,
-            tolerance: self.plan.settings.tolerance,
-            shortest_load_step: SHORTEST,
-        };
-        (work.ending, work.residual) =
-            load_stepping.solve(self.plan, system, target, &limits, &mut budget);
-        Ok(self.report(work, self.plan.settings.max_iterations - budget))
-    }
-
-    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
-    /// elements; a start that does not help is dropped.
-    ///
-    /// # Errors
-    /// `InvalidInput` for a start with another number of strains.
-    pub fn solve_from(
-        &self,
-        start: &State,
-        displacements: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        work.system.reset(self.plan);
-        let NewtonSystem { strains, tensions, .. } = &mut work.system;
-        read_state(start, self.plan, strains, tensions)?;
-        work.ending = Ending::Converged;
-        self.resume(displacements, work)
     }
 
     /// Solves from the strains and tensions at hand to the displacements; returns the number of evaluations.
@@ -230,6 +169,8 @@ pub(super) fn report(ending: Ending, residual: f64, evaluations: usize) -> Repor
 }
 
 impl Model for Rod<'_> {
+    const NAME: &'static str = "rod";
+
     type Scratch = Scratch;
 
     fn robot(&self) -> &Robot {
@@ -259,6 +200,78 @@ impl Model for Rod<'_> {
             }
         }
         self.solve(displacements, work)
+    }
+
+    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
+    /// elements; a start that does not help is dropped.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a start with another number of strains.
+    fn solve_from(
+        &self,
+        start: &State,
+        displacements: &[f64],
+        work: &mut Scratch,
+    ) -> Result<Report, InvalidInput> {
+        work.system.reset(self.plan);
+        let NewtonSystem { strains, tensions, .. } = &mut work.system;
+        read_state(start, self.plan, strains, tensions)?;
+        work.ending = Ending::Converged;
+        self.resume(displacements, work)
+    }
+
+    /// Shape under given tensions, in the unit of the results: displacements follow from it. It is a minimum
+    /// reachable from rest as the tensions grow together; infeasible beyond where that path ends.
+    ///
+    /// # Errors
+    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
+    fn solve_tensions(&self, tensions: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
+        let expected = "sliding tendons where tensions are given";
+        self.plan.settings.tendons.require_tensions("tendons", expected)?;
+        self.plan.check_tensions(tensions)?;
+        let mut budget = self.plan.settings.max_iterations;
+        self.share_stop(work);
+        let Scratch { system, load_stepping, .. } = work;
+        system.reset(self.plan);
+        system.clear_bounds(self.plan);
+        system.active.clear();
+        system.active.extend(tensions.iter().map(|tension| *tension > 0.0));
+        let target = tensions.iter().map(|tension| tension / self.plan.unit);
+        let limits = Limits {
+            newton_steps: NEWTON_STEPS,
+            tolerance: self.plan.settings.tolerance,
+            shortest_load_step: SHORTEST,
+        };
+        (work.ending, work.residual) =
+            load_stepping.solve(self.plan, system, target, &limits, &mut budget);
+        Ok(self.report(work, self.plan.settings.max_iterations - budget))
+    }
+
+    /// Displacements under which a shape has the lengths and tensions that it has, `L − c T − L_rest` \[m\].
+    fn displacements(&self, state: &State) -> Vec<f64> {
+        let plan = self.plan;
+        let rows = state.tendon_lengths.iter().zip(&state.tensions);
+        let plans = plan.rest_lengths.iter().zip(&plan.compliance);
+        let change = |((own, tension), (rest, compliance)): ((&f64, &f64), (&f64, &f64))| {
+            own - compliance * tension / plan.unit - rest
+        };
+        rows.zip(plans).map(change).collect()
+    }
+
+    fn jacobian(
+        &self,
+        displacements: &[f64],
+        start: Option<&State>,
+        work: &mut Scratch,
+    ) -> Result<Result<Matrix6xX<f64>, Report>, InvalidInput> {
+        let report = match start {
+            Some(start) => self.solve_from(start, displacements, work)?,
+            None => self.solve(displacements, work)?,
+        };
+        if report.status != Status::Converged {
+            return Ok(Err(report));
+        }
+        Ok(Ok(self.sensitivity(displacements, work).jacobian(self.robot.tool())))
     }
 
     fn state<'w>(&self, work: &'w Scratch) -> &'w State {

@@ -13,7 +13,6 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::lie::Pose;
 use crate::model::State;
-use crate::obstacle::Fault;
 
 pub(crate) use contact::ContactRod;
 pub(crate) use free::FreeRod;
@@ -59,11 +58,6 @@ pub(crate) trait Equilibrium: Debug {
 
     /// Shape at hand, where tensions do not determine which one it is.
     fn state(&mut self) -> Option<State> {
-        None
-    }
-
-    /// Fault of an obstacle's function that ended the work, if one did.
-    fn take_fault(&mut self) -> Option<Fault> {
         None
     }
 }
