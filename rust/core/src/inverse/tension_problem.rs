@@ -29,7 +29,7 @@ pub(super) struct TensionProblem<'a, G = PoseGoal<'a>> {
     pub(super) slack_allowance: f64,
     tensions: Vec<f64>,
     /// The point evaluated last is an equilibrium.
-    balanced: bool,
+    in_equilibrium: bool,
     second: Vec<f64>,
 }
 
@@ -58,7 +58,7 @@ impl<'a, G> TensionProblem<'a, G> {
             has_bounds: ranges.iter().any(finite),
             slack_allowance: 0.0,
             tensions: Vec::new(),
-            balanced: false,
+            in_equilibrium: false,
             second: Vec::new(),
         }
     }
@@ -71,18 +71,18 @@ impl<'a, G> TensionProblem<'a, G> {
         // Rounding leaves no tension below zero.
         let tension = |(z, unit): (&f64, &f64)| (z * unit).max(0.0);
         let wanted = z.iter().zip(self.units).map(tension);
-        if !(self.balanced && wanted.clone().eq(self.tensions.iter().copied())) {
+        if !(self.in_equilibrium && wanted.clone().eq(self.tensions.iter().copied())) {
             self.tensions.clear();
             self.tensions.extend(wanted);
-            self.balanced = self.rod.go(&self.tensions);
-            if self.balanced {
+            self.in_equilibrium = self.rod.go(&self.tensions);
+            if self.in_equilibrium {
                 self.rod.differentiate();
             }
         }
-        if self.balanced {
+        if self.in_equilibrium {
             self.goal.update(self.rod.motion());
         }
-        self.balanced
+        self.in_equilibrium
     }
 
     /// Displacements at the equilibrium \[m\]; rounding leaves none outside its bounds.
@@ -97,13 +97,13 @@ impl<'a, G> TensionProblem<'a, G> {
     }
 
     /// True when the point evaluated last is an equilibrium.
-    pub(super) fn balanced(&self) -> bool {
-        self.balanced
+    pub(super) fn in_equilibrium(&self) -> bool {
+        self.in_equilibrium
     }
 
     /// Invalidates the point evaluated last: the rod is moved elsewhere.
     pub(super) fn forget(&mut self) {
-        self.balanced = false;
+        self.in_equilibrium = false;
     }
 
     /// Bounds on displacements that are active at the point evaluated last: a tendon, and true for its release.
@@ -179,7 +179,7 @@ impl<const R: usize, G: Goal<R>> Problem<R> for TensionProblem<'_, G> {
     }
 
     fn linearize(&self, rows: &mut Rows) {
-        if !self.balanced {
+        if !self.in_equilibrium {
             return;
         }
         let size = self.units.len();
@@ -200,7 +200,7 @@ impl<const R: usize, G: Goal<R>> Problem<R> for TensionProblem<'_, G> {
     }
 
     fn violation(&self) -> f64 {
-        if !(self.has_bounds && self.balanced) {
+        if !(self.has_bounds && self.in_equilibrium) {
             return 0.0;
         }
         let rows = self.ranges.iter().zip(self.rest_lengths).enumerate();
@@ -253,7 +253,7 @@ pub(super) fn evaluate_answer<const R: usize, G: Goal<R>>(
         found.status = Status::Infeasible;
     }
     search.solver.evaluate(problem, &search.point);
-    if failed && !problem.balanced() {
+    if failed && !problem.in_equilibrium() {
         return Answer::without_shape(found);
     }
     Answer::of(found, errors(&problem.goal))
