@@ -8,7 +8,6 @@ use crate::inverse::multistart::{Freedom, Multistart, SearchOptions, SearchOutco
 use crate::inverse::tension_problem::TensionProblem;
 use crate::lie::{Pose, so3};
 use crate::model::Model as _;
-use crate::obstacle::Fault;
 use crate::robot::Robot;
 use crate::rod::contact::{LoadedRod, Scratch};
 use crate::status::Status;
@@ -151,10 +150,6 @@ impl<'a> FromRest<'a> {
             return "";
         }
         "met on a way through other shapes: from rest the same displacements lead to another shape (start from answer.shape)"
-    }
-
-    pub(super) fn take_fault(&mut self) -> Option<Fault> {
-        self.work.take_fault()
     }
 }
 
