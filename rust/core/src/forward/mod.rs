@@ -28,6 +28,16 @@ pub use task::Rows;
 use task::{ChainedShape, SolveLoad, SolveRows, Task, ToolJacobian};
 
 /// Forward model with its settings.
+///
+/// ```
+/// use tdcr::forward::ModelSettings;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// assert_eq!(ModelSettings::default().model(), "rod");
+/// assert!(ModelSettings::of_model("linkage")?.check_derivatives().is_err());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ModelSettings {
     /// Strain-energy rod.
