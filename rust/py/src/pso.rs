@@ -1,6 +1,6 @@
 //! The engine of `tdcr.pso.minimize`: a swarm over a Python function.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -10,10 +10,8 @@ use tdcr::solve::pso::{Objective, Progress, Swarm};
 
 use crate::convert::arguments::returned;
 use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
+use crate::convert::interruptible::POLL;
 use crate::settings::pso::PsoSettings;
-
-/// How often progress is told.
-const POLL: Duration = Duration::from_millis(50);
 
 /// A Python function with those who follow the run.
 struct Function<'a, 'py> {

@@ -28,8 +28,11 @@ pub(crate) enum Load {
     Tensions(Vec<f64>),
 }
 
-/// Rods with more second derivatives than this may take longer than a second.
-const LONG: usize = 20_000;
+/// Estimated time of a hard solve of a rod \[µs\], where a subsegment of nine second derivatives takes
+/// `per_subsegment` in a usual one: a hard one takes twenty times as long.
+pub(crate) fn estimated_microseconds(plan: &Plan, per_subsegment: f64) -> f64 {
+    20.0 / 9.0 * per_subsegment * plan.second_derivatives() as f64
+}
 
 /// Runs what solves a rod without the GIL: where Ctrl-C can stop it, if that may take long.
 pub(crate) fn run<T: Send>(
@@ -38,11 +41,9 @@ pub(crate) fn run<T: Send>(
     plan: &Plan,
     job: impl FnOnce(&Rod<'_>) -> T + Send,
 ) -> PyResult<T> {
-    let rod = Rod::new(robot, plan);
-    if plan.second_derivatives() < LONG {
-        return Ok(py.detach(|| job(&rod)));
-    }
-    interruptible::run(py, None, |control| job(&rod.stopped_by(Arc::clone(&control.stop))))
+    interruptible::run_if_long(py, estimated_microseconds(plan, 1.0), |control| {
+        job(&Rod::new(robot, plan).stopped_by(Arc::clone(&control.stop)))
+    })
 }
 
 /// Displacements and the shape, found from rest or from an earlier shape.

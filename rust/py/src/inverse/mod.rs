@@ -4,7 +4,6 @@ pub(crate) mod batch;
 pub(crate) mod cartesian_path;
 pub(crate) mod targets;
 
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use nalgebra::Vector3;
@@ -29,19 +28,18 @@ use crate::scene::{self, Surroundings, Watched, checked};
 use crate::settings::bounds::Bounds;
 use crate::settings::inverse::InverseSettings;
 
-/// Steps and evaluations, of a few tenths of a microsecond each, up to which a single inverse ends soon
-/// enough to go without listening for Ctrl-C.
-const SOON: usize = 200_000;
+/// Time of a step or an evaluation of arcs \[µs\].
+const MICROSECONDS_PER_ARC_STEP: f64 = 0.25;
 
-/// How many times as long those of the rod take.
-const ROD: usize = 100;
+/// Time of a step or an evaluation of a rod \[µs\].
+const MICROSECONDS_PER_ROD_STEP: f64 = 25.0;
 
-/// Whether it does, by what a step takes.
-fn soon(search: &tdcr::inverse::InverseSettings, each: usize) -> bool {
+/// Estimated time of a single inverse that uses all its starts and steps \[µs\].
+fn estimated_microseconds(search: &tdcr::inverse::InverseSettings, per_step: f64) -> f64 {
     let starts = if search.method == Method::Swarm { search.starts } else { 1 };
-    let swarms = search.swarm.particles.saturating_mul(search.swarm.max_iterations);
-    let steps = search.starts.saturating_mul(search.max_iterations);
-    steps.saturating_add(swarms.saturating_mul(starts)).saturating_mul(each) <= SOON
+    let swarms = search.swarm.particles as f64 * search.swarm.max_iterations as f64;
+    let steps = search.starts as f64 * search.max_iterations as f64;
+    (steps + swarms * starts as f64) * per_step
 }
 
 /// The model's knowledge of a robot, which an inverse refers to.
@@ -183,13 +181,17 @@ pub(crate) fn _inverse(
     let target = one_target(target)?;
     let found = match &engine {
         Engine::Arcs(inverse) => {
-            let soon = soon(inverse.settings(), 1);
-            invert_one(py, &**inverse, &target, start, &around, soon)?
+            let time = estimated_microseconds(inverse.settings(), MICROSECONDS_PER_ARC_STEP);
+            invert_one(py, &**inverse, &target, start, &around, time)?
         }
         Engine::Rod(inverse) => {
-            let soon = around.any().is_none() && soon(inverse.settings(), ROD);
+            // Among obstacles there is no bound.
+            let time = match around.any() {
+                None => estimated_microseconds(inverse.settings(), MICROSECONDS_PER_ROD_STEP),
+                Some(_) => f64::INFINITY,
+            };
             // First: an interrupt stops the functions of obstacles too.
-            let found = invert_one(py, &**inverse, &target, start, &around, soon)?;
+            let found = invert_one(py, &**inverse, &target, start, &around, time)?;
             checked(py, Mutex::new(inverse.take_fault()))?;
             found
         }
@@ -292,13 +294,15 @@ fn invert_one<I: Inverter>(
     target: &Target,
     start: Option<&Bound<'_, PyAny>>,
     around: &Surroundings,
-    soon: bool,
+    microseconds: f64,
 ) -> PyResult<Found> {
     inverse.check_target(target).map_err(|e| invalid(&e))?;
     let start = one_start(inverse.robot(), start)?;
-    let solve = |stop: Option<&Arc<AtomicBool>>| {
-        let start = start.map(|own| inverse.start(&own, stop).map_err(of_start)).transpose()?;
-        let mut work = inverse.buffers(stop.map(AsRef::as_ref));
+    let found = interruptible::run_if_long(py, microseconds, |control| {
+        around.stopped_by(&control.stop);
+        let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
+        let start = start.map(begin).transpose()?;
+        let mut work = inverse.buffers(Some(&*control.stop));
         let answer = inverse.solve(target, start.as_ref(), &mut work);
         let mut displacements = vec![f64::NAN; inverse.robot().tendons().len()];
         let mut tensions = displacements.clone();
@@ -306,15 +310,7 @@ fn invert_one<I: Inverter>(
         inverse.write_tensions(&work, &mut tensions);
         let message = inverse.message(&answer, &work);
         Ok(((displacements, tensions, answer, message), inverse.state(&mut work)))
-    };
-    let found = if soon {
-        py.detach(|| solve(None))
-    } else {
-        interruptible::run(py, None, |control| {
-            around.stopped_by(&control.stop);
-            solve(Some(&control.stop))
-        })?
-    };
+    })?;
     found.map_err(|e| invalid(&e))
 }
 

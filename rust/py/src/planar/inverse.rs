@@ -1,6 +1,6 @@
 //! The engines of `PlanarTrunk.inverse` and `inverse_batch`; their docstrings are in Python.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use nalgebra::Vector2;
 use numpy::PyUntypedArrayMethods;
@@ -10,21 +10,18 @@ use pyo3::types::PyDict;
 use tdcr::batch::pool;
 use tdcr::planar::{
     Circle, Goal, Inverse, InverseSettings, Row, SwarmInverse, SwarmSettings, SwarmSolver,
-    Unknowns, WatchDecision, inverse, inverse_rows, inverse_until, solve_rows,
+    Unknowns, WatchDecision, inverse_rows, inverse_until, solve_rows,
 };
 use tdcr::{InvalidInput, Status};
 
 use crate::convert::arguments::{OneOrMany, number, optional, text, whole};
 use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
-use crate::convert::interruptible;
+use crate::convert::interruptible::{self, POLL};
 use crate::planar::trunk::{coordinate, pairs, row, trunk};
 use crate::settings::pso::PsoSettings;
 
-/// How often a single search looks at signals.
-const POLL: Duration = Duration::from_millis(50);
-
-/// Newton steps times sections at most, from which on a single call listens for Ctrl-C.
-const LONG: usize = 20_000;
+/// Estimated time of a section in a Newton step \[µs\].
+const MICROSECONDS_PER_SECTION: f64 = 2.5;
 
 fn newton_settings(
     tolerance: &Bound<'_, PyAny>,
@@ -145,13 +142,9 @@ pub(crate) fn _planar_newton<'py>(
     let trunk = trunk(lengths, cable_distance)?;
     let goal = one_goal(x, y, heading, limit)?;
     let settings = newton_settings(tolerance, max_iterations, starts)?;
-    let sections = trunk.lengths().len();
-    let steps = settings.starts.saturating_mul(settings.max_iterations).saturating_mul(sections);
-    if steps < LONG {
-        let found = py.detach(|| inverse(&trunk, &goal, &settings)).map_err(|e| invalid(&e))?;
-        return fields(py, found);
-    }
-    let found = interruptible::run(py, None, |control| {
+    let steps = settings.starts as f64 * settings.max_iterations as f64;
+    let microseconds = steps * trunk.lengths().len() as f64 * MICROSECONDS_PER_SECTION;
+    let found = interruptible::run_if_long(py, microseconds, |control| {
         inverse_until(&trunk, &goal, &settings, &control.stop)
     })?;
     // Stopped only by an exception, which is raised already.
