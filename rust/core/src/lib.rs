@@ -31,6 +31,7 @@ pub mod batch;
 pub mod constant_curvature;
 pub mod design;
 pub mod error;
+pub mod forward;
 mod hashing;
 pub mod inverse;
 pub mod lie;

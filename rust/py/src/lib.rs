@@ -32,13 +32,11 @@ mod _core {
     #[pymodule_export]
     use crate::design::routing::{_routing, _routing_batch};
     #[pymodule_export]
-    use crate::forward::batch::{_fields, _forward_batch};
+    use crate::forward::batch::{_chained_shape, _fields, _forward_batch};
     #[pymodule_export]
     use crate::forward::forward;
     #[pymodule_export]
     use crate::forward::jacobian::jacobian;
-    #[pymodule_export]
-    use crate::forward::rod::_chained_shape;
     #[pymodule_export]
     use crate::forward::sensitivity::{Sensitivity, sensitivity};
     #[pymodule_export]

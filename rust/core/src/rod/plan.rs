@@ -144,6 +144,12 @@ impl Plan {
         }
     }
 
+    /// Settings that it was made with.
+    #[must_use]
+    pub fn settings(&self) -> &RodSettings {
+        &self.settings
+    }
+
     /// How displacements are imposed.
     pub(crate) fn tendon_rule(&self) -> TendonRule {
         self.settings.tendons

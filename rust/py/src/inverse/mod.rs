@@ -4,27 +4,28 @@ pub(crate) mod batch;
 pub(crate) mod cartesian_path;
 pub(crate) mod targets;
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
+use tdcr::forward::{Forward, Load, ModelSettings, Plan};
 use tdcr::inverse::{
     Answer, ConstantCurvatureInverse, Inverter, Method, Placed, RodInverse, Target,
 };
-use tdcr::model::State;
+use tdcr::model::{State, rod_only};
 use tdcr::rod::contact::Scene;
 use tdcr::{InvalidInput, constant_curvature, rod};
 
 use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
 use crate::convert::interruptible;
-use crate::forward::model_choice::{Choice, rod_only};
-use crate::forward::rod::Load;
+use crate::forward::model_choice::model_settings;
+use crate::forward::run;
 use crate::forward::shape::Shape;
 use crate::inverse::targets::one_target;
 use crate::robot::Robot;
-use crate::scene::{self, Surroundings, Watched, checked};
+use crate::scene::{Surroundings, raise_fault};
 use crate::settings::bounds::Bounds;
 use crate::settings::inverse::InverseSettings;
 
@@ -43,8 +44,8 @@ fn estimated_microseconds(search: &tdcr::inverse::InverseSettings, per_step: f64
 }
 
 /// The model's knowledge of a robot, which an inverse refers to.
-pub(crate) enum Plans<'a> {
-    Arcs(&'a constant_curvature::Plan),
+pub(crate) enum Plans {
+    Arcs(Arc<constant_curvature::Plan>),
     Rod(Arc<rod::Plan>, Option<Scene>),
 }
 
@@ -54,28 +55,25 @@ pub(crate) enum Engine<'a> {
     Rod(Box<RodInverse<'a>>),
 }
 
-impl<'a> Plans<'a> {
+impl Plans {
     pub(crate) fn new(
-        robot: &'a Bound<'_, Robot>,
+        robot: &Bound<'_, Robot>,
         model: &str,
         settings: Option<&Bound<'_, PyAny>>,
         around: &Surroundings,
     ) -> PyResult<Self> {
-        let choice = Choice::new(model, settings)?;
-        match choice {
-            Choice::Rod(_) => {}
-            _ => around.any().map_or(Ok(()), |what| Err(rod_only(what, model)))?,
-        }
-        match choice {
-            Choice::ConstantCurvature(settings) => {
-                robot.get().constant_curvature_plan(settings).map(Self::Arcs)
+        let settings = model_settings(model, settings)?;
+        around.check(&settings)?;
+        let core: &tdcr::robot::Robot = &robot.get().0;
+        match settings {
+            ModelSettings::ConstantCurvature(settings) => {
+                Plan::constant_curvature(core, settings).map(Self::Arcs)
             }
-            Choice::Rod(settings) => robot.get().rod_plan(settings).and_then(|plan| {
-                let core = &robot.get().0;
-                let scene = around.any().map(|_| around.scene(core, &plan, &settings));
-                Ok(Self::Rod(plan, scene.transpose()?))
+            ModelSettings::Rod(settings) => Plan::rod(core, settings).and_then(|plan| {
+                let scene = around.scene(core, &plan)?;
+                Ok(Self::Rod(plan, scene))
             }),
-            Choice::Linkage(_) => {
+            ModelSettings::Linkage(_) => {
                 let expected = "a model with an inverse (\"rod\" or \"constant_curvature\")";
                 Err(InvalidInput::new("model", expected, format!("\"{model}\"")))
             }
@@ -83,7 +81,7 @@ impl<'a> Plans<'a> {
         .map_err(|e| invalid(&e))
     }
 
-    pub(crate) fn engine(
+    pub(crate) fn engine<'a>(
         &'a self,
         robot: &'a Bound<'_, Robot>,
         bounds: Option<&Bound<'_, PyAny>>,
@@ -192,30 +190,30 @@ pub(crate) fn _inverse(
             };
             // First: an interrupt stops the functions of obstacles too.
             let found = invert_one(py, &**inverse, &target, start, &around, time)?;
-            checked(py, Mutex::new(inverse.take_fault()))?;
+            raise_fault(py, inverse.take_fault())?;
             found
         }
     };
-    with_shape(py, robot, &plans, found, Choice::new(model, settings)?, around)
+    with_shape(py, robot, found, model_settings(model, settings)?, around)
 }
 
 /// A row, and the shape found where displacements do not say which it is: solved again from there.
 fn with_shape(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
-    plans: &Plans<'_>,
     ((displacements, tensions, answer, message), state): Found,
-    choice: Choice,
+    settings: ModelSettings,
     around: Surroundings,
 ) -> PyResult<(Row, Option<Shape>)> {
-    let shape = match (state, plans) {
-        (Some(state), Plans::Rod(plan, Some(scene))) => {
+    let shape = match state {
+        Some(state) => {
             let load = Load::Displacements(displacements.clone());
-            let solve = |rod: &Watched<'_>| rod.solve_load(load, Some(state));
-            let (given, shape) = scene::solve(py, &robot.get().0, plan, scene, solve)?;
-            Some(Shape::new(robot.get().clone(), choice, given, shape).among(around))
+            let solve = |forward: &Forward<'_>| forward.solve(load, Some(&state));
+            let core = &robot.get().0;
+            let solution = run(py, around.prepare(core, settings)?, Some(&around), solve)?;
+            Some(Shape::new(robot.get().clone(), settings, solution).among(around))
         }
-        _ => None,
+        None => None,
     };
     Ok((row(py, displacements, tensions, &answer, message)?, shape))
 }
@@ -269,7 +267,7 @@ pub(crate) fn _inverse_places(
     let around = Surroundings::new(py, Some(obstacles), loads)?;
     let plans = Plans::new(robot, model, settings, &around)?;
     let engine = plans.engine(robot, bounds, search, method)?;
-    let Engine::Rod(inverse) = &engine else { return Err(rod_only("positions", model)) };
+    let Engine::Rod(inverse) = &engine else { return Err(invalid(&rod_only("positions", model))) };
     let places = wanted_places(&robot.get().0, positions)?;
     let start = one_start(inverse.robot(), start)?;
     let found = interruptible::run(py, None, |control| {
@@ -278,11 +276,11 @@ pub(crate) fn _inverse_places(
         let start = start.map(begin).transpose()?;
         inverse.solve_places(&places, start.as_ref(), Some(&control.stop))
     })?;
-    checked(py, Mutex::new(inverse.take_fault()))?;
+    raise_fault(py, inverse.take_fault())?;
     let Placed { answer, displacements, tensions, message, state } =
         found.map_err(|e| invalid(&e))?;
     let found = ((displacements, tensions, answer, message), state);
-    with_shape(py, robot, &plans, found, Choice::new(model, settings)?, around)
+    with_shape(py, robot, found, model_settings(model, settings)?, around)
 }
 
 /// Displacements, tensions, how it ended and the message, and the shape where displacements do not say which it is.
