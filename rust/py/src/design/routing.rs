@@ -70,7 +70,7 @@ pub(crate) fn _routing<'py>(
     told(py, answer.map_err(|e| invalid(&e))?, &settings)
 }
 
-/// The same of every row, on `threads`.
+/// Routings of every row, on `threads`.
 #[pyfunction]
 pub(crate) fn _routing_batch<'py>(
     py: Python<'py>,

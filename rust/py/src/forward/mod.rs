@@ -5,6 +5,7 @@ pub(crate) mod jacobian;
 pub(crate) mod model_choice;
 pub(crate) mod sensitivity;
 pub(crate) mod shape;
+pub(crate) mod shape_arrays;
 pub(crate) mod shape_parts;
 
 use numpy::PyUntypedArrayMethods;

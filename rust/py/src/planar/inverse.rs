@@ -15,7 +15,9 @@ use tdcr::planar::{
 use tdcr::{InvalidInput, Status};
 
 use crate::convert::arguments::{OneOrMany, number, optional, text, whole};
-use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
+use crate::convert::arrays::{
+    float_array, frozen, frozen_statuses, invalid, status, values, wrong_shape,
+};
 use crate::convert::interruptible::{self, POLL};
 use crate::planar::trunk::{coordinate, pairs, row, trunk};
 use crate::settings::pso::PsoSettings;
@@ -169,24 +171,27 @@ pub(crate) fn _planar_swarm<'py>(
     let goal = one_goal(x, y, heading, limit)?;
     let circles = circles(&keywords.obstacles)?;
     let settings = keywords.settings()?;
+    // Solve without the GIL: a callback hears of every move, signals get a look every 50 ms.
     let mut solver = SwarmSolver::new(&trunk, &circles, &settings).map_err(|e| invalid(&e))?;
     let mut listener = Listener { callback: callback.map(|c| c.clone().unbind()), fault: None };
     let seed = settings.swarm.seed;
     let found = py.detach(|| {
-        let mut heard = Instant::now();
+        let mut last_poll = Instant::now();
         solver.solve(&goal, seed, &mut |progress| {
-            if listener.callback.is_none() && heard.elapsed() < POLL {
+            if listener.callback.is_none() && last_poll.elapsed() < POLL {
                 return WatchDecision::GoOn;
             }
-            heard = Instant::now();
+            last_poll = Instant::now();
             listener.ask(progress.iteration, progress.value)
         })
     });
+    // An exception of the callback or a signal ends the search.
     if let Some(fault) = listener.fault {
         return Err(fault);
     }
     // Abandoned only with a fault.
     let Some(found) = found.map_err(|e| invalid(&e))? else { return Ok(PyDict::new(py)) };
+    // The inverse, and what the swarms did.
     let SwarmInverse { inverse, clearance, value, history, moves, evaluations, swarms, seed } =
         found;
     let answer = fields(py, inverse)?;
@@ -348,11 +353,7 @@ fn columns<'py>(
     table.set_item("error", frozen(py, floats(|a| a.error), &count)?)?;
     table.set_item("heading_error", frozen(py, floats(|a| a.heading_error), &count)?)?;
     table.set_item("energy", frozen(py, floats(|a| a.energy), &count)?)?;
-    let mut statuses = Vec::with_capacity(answers.len());
-    for answer in answers {
-        statuses.push(status(py, answer.status)?.unbind());
-    }
-    table.set_item("status", frozen(py, statuses, &count)?)?;
+    table.set_item("status", frozen_statuses(py, answers.iter().map(|a| a.status))?)?;
     let counts = |column: fn(&Inverse) -> usize| {
         answers.iter().map(|a| column(a) as u64).collect::<Vec<_>>()
     };
