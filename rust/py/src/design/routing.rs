@@ -15,7 +15,8 @@ use crate::robot::Robot;
 use crate::settings::bounds::range;
 use crate::settings::routing::RoutingSettings;
 
-/// Robot, shape, displacements, holes, errors, root mean squares, optimality, iterations, evaluations, status and message.
+/// Robot, shape, displacements, holes, errors, root mean squares, optimality, iterations, evaluations, status and
+/// message.
 fn told<'py>(
     py: Python<'py>,
     answer: Routed,

@@ -86,7 +86,8 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
 /// Tendons under tension count, and those that are just as long as they may be: the latter are followed on
 /// their pulled side, at rest for instance, for changes that let none of them go slack. Free and slack ones
 /// do not. Where tendons that count depend on each other (`dependent`), displacements cannot change one by
-/// one: derivatives are then those of the nearest change that the rod can follow. With proportional tendons, tensions are those of the base pieces.
+/// one: derivatives are then those of the nearest change that the rod can follow. With proportional tendons,
+/// tensions are those of the base pieces.
 #[pyclass(frozen, eq, module = "tdcr")]
 pub(crate) struct Sensitivity {
     shape: Py<Shape>,
