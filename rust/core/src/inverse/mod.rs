@@ -16,6 +16,7 @@ mod pose_residual;
 mod position_goal;
 mod rod;
 mod settings;
+mod single;
 mod swarm_starts;
 mod tension_problem;
 
@@ -26,8 +27,9 @@ pub use bounds::{Bounds, Range};
 pub use cartesian_path::cartesian_path;
 pub use constant_curvature::{ConstantCurvatureInverse, Scratch, Solution};
 pub use outcome::Answer;
-pub use rod::{Placed, RodInverse, RodScratch};
+pub use rod::{RodInverse, RodScratch};
 pub use settings::{InverseSettings, Method};
+pub use single::{Inversion, invert};
 
 use crate::error::InvalidInput;
 use crate::lie::{Pose, so3};

@@ -12,9 +12,9 @@ use pyo3::prelude::*;
 
 use tdcr::forward::{Forward, Load, ModelSettings, Plan};
 use tdcr::inverse::{
-    Answer, ConstantCurvatureInverse, Inverter, Method, Placed, RodInverse, Target,
+    Answer, ConstantCurvatureInverse, Inversion, Inverter, Method, RodInverse, Target, invert,
 };
-use tdcr::model::{State, rod_only};
+use tdcr::model::rod_only;
 use tdcr::rod::contact::Scene;
 use tdcr::{InvalidInput, constant_curvature, rod};
 
@@ -201,10 +201,11 @@ pub(crate) fn _inverse(
 fn with_shape(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
-    ((displacements, tensions, answer, message), state): Found,
+    found: Inversion,
     settings: ModelSettings,
     around: Surroundings,
 ) -> PyResult<(Row, Option<Shape>)> {
+    let Inversion { answer, displacements, tensions, message, state } = found;
     let shape = match state {
         Some(state) => {
             let load = Load::Displacements(displacements.clone());
@@ -277,14 +278,9 @@ pub(crate) fn _inverse_places(
         inverse.solve_places(&places, start.as_ref(), Some(&control.stop))
     })?;
     raise_fault(py, inverse.take_fault())?;
-    let Placed { answer, displacements, tensions, message, state } =
-        found.map_err(|e| invalid(&e))?;
-    let found = ((displacements, tensions, answer, message), state);
+    let found = found.map_err(|e| invalid(&e))?;
     with_shape(py, robot, found, model_settings(model, settings)?, around)
 }
-
-/// Displacements, tensions, how it ended and the message, and the shape where displacements do not say which it is.
-type Found = ((Vec<f64>, Vec<f64>, Answer, String), Option<State>);
 
 fn invert_one<I: Inverter>(
     py: Python<'_>,
@@ -293,21 +289,12 @@ fn invert_one<I: Inverter>(
     start: Option<&Bound<'_, PyAny>>,
     around: &Surroundings,
     microseconds: f64,
-) -> PyResult<Found> {
+) -> PyResult<Inversion> {
     inverse.check_target(target).map_err(|e| invalid(&e))?;
     let start = one_start(inverse.robot(), start)?;
     let found = interruptible::run_if_long(py, microseconds, |control| {
         around.stopped_by(&control.stop);
-        let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
-        let start = start.map(begin).transpose()?;
-        let mut work = inverse.buffers(Some(&*control.stop));
-        let answer = inverse.solve(target, start.as_ref(), &mut work);
-        let mut displacements = vec![f64::NAN; inverse.robot().tendons().len()];
-        let mut tensions = displacements.clone();
-        inverse.write_displacements(&work, &mut displacements);
-        inverse.write_tensions(&work, &mut tensions);
-        let message = inverse.message(&answer, &work);
-        Ok(((displacements, tensions, answer, message), inverse.state(&mut work)))
+        invert(inverse, target, start.as_deref(), Some(&control.stop))
     })?;
     found.map_err(|e| invalid(&e))
 }

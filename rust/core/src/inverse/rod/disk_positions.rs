@@ -9,8 +9,8 @@ use crate::error::InvalidInput;
 use crate::inverse::Target;
 use crate::inverse::batch::near_enough;
 use crate::inverse::multistart::{Effort, Freedom, Search};
-use crate::inverse::outcome::Answer;
 use crate::inverse::position_goal::PlacesGoal;
+use crate::inverse::single::Inversion;
 use crate::inverse::tension_problem::Pull;
 use crate::lie::{Pose, so3};
 use crate::model::State;
@@ -22,21 +22,6 @@ const STARTS: usize = 24;
 const BEND: f64 = 1.0;
 /// Most tendons.
 const TENDONS: usize = 63;
-
-/// What was found for wanted places.
-#[derive(Clone, Debug)]
-pub struct Placed {
-    /// How it ended; its distance is the largest of a disk.
-    pub answer: Answer,
-    /// Tendon displacements \[m\].
-    pub displacements: Vec<f64>,
-    /// Tensions, in the unit of the results.
-    pub tensions: Vec<f64>,
-    /// What stood in the way; empty when every place is met.
-    pub message: String,
-    /// The shape, where displacements do not say which it is.
-    pub state: Option<State>,
-}
 
 impl RodInverse<'_> {
     /// Seeks what brings disks nearest to their places \[m\], world frame, one per disk from the first, or none: least
@@ -50,7 +35,7 @@ impl RodInverse<'_> {
         places: &[Option<Vector3<f64>>],
         start: Option<&State>,
         stop: Option<&AtomicBool>,
-    ) -> Result<Placed, InvalidInput> {
+    ) -> Result<Inversion, InvalidInput> {
         let disks = self.robot.backbone().subsegments();
         if places.len() != disks {
             let expected = format!("{disks} places, one per disk from the first");
@@ -82,7 +67,7 @@ impl RodInverse<'_> {
         places: &[Option<Vector3<f64>>],
         start: Option<&State>,
         stop: Option<&AtomicBool>,
-    ) -> Placed {
+    ) -> Inversion {
         let world = self.robot.base().inverse();
         let local: Vec<_> = places.iter().map(|p| p.map(|p| world.transform(&p))).collect();
         let known = local.iter().enumerate().filter_map(|(disk, place)| Some((disk, (*place)?)));
@@ -130,7 +115,7 @@ impl RodInverse<'_> {
                 )
             }
         };
-        let mut placed = Placed {
+        let mut placed = Inversion {
             answer,
             displacements: vec![0.0; self.units.len()],
             tensions: vec![0.0; self.units.len()],

@@ -31,7 +31,6 @@ use crate::rod::equilibrium::{ContactRod, Equilibrium};
 use crate::rod::{self, Plan, Rod, TendonRule};
 use crate::solve::convex_region::Region;
 use crate::status::Status;
-pub use disk_positions::Placed;
 use from_rest::Rise;
 use outcome::ended;
 
