@@ -16,7 +16,7 @@ use crate::batch::{Control, Solved};
 use crate::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings};
 use crate::error::InvalidInput;
 use crate::linkage::{Linkage, LinkageSettings};
-use crate::model::{Model, Shape, State, rod_only};
+use crate::model::{Model, Shape, State, no_derivatives, rod_only};
 use crate::obstacle::{Fault, FirstFault, Obstacle};
 use crate::robot::Robot;
 use crate::rod::contact::{LoadedRod, Loads, Scene};
@@ -69,6 +69,29 @@ impl ModelSettings {
             let expected = "\"rod\", \"linkage\" or \"constant_curvature\"";
             InvalidInput::new("model", expected, format!("\"{name}\""))
         })
+    }
+
+    /// Refusal of rows that start from each other by models without states to start from.
+    ///
+    /// # Errors
+    /// `InvalidInput` for warm rows of a model other than the rod.
+    pub fn check_warm(&self, warm: bool) -> Result<(), InvalidInput> {
+        if warm && !matches!(self, Self::Rod(_)) {
+            let got = format!("True for model \"{}\"", self.model());
+            return Err(InvalidInput::new("warm", "False, or model \"rod\"", got));
+        }
+        Ok(())
+    }
+
+    /// Refusal of Jacobians by the model without derivatives.
+    ///
+    /// # Errors
+    /// `InvalidInput` for the linkage.
+    pub fn check_derivatives(&self) -> Result<(), InvalidInput> {
+        match self {
+            Self::Rod(_) | Self::ConstantCurvature(_) => Ok(()),
+            Self::Linkage(_) => Err(no_derivatives(self.model())),
+        }
     }
 
     /// Refusal of obstacles and loads by models that know no forces.
@@ -188,10 +211,7 @@ impl<'r> Forward<'r> {
         pool: &ThreadPool,
         control: &Control,
     ) -> Result<Option<Solved>, InvalidInput> {
-        if rows.warm && !matches!(self.plan, Plan::Rod(_)) {
-            let got = format!("True for model \"{}\"", self.plan.settings().model());
-            return Err(InvalidInput::new("warm", "False, or model \"rod\"", got));
-        }
+        self.plan.settings().check_warm(rows.warm)?;
         self.run(SolveRows { rows, pool, control })
     }
 

@@ -15,6 +15,26 @@ use crate::robot::Robot;
 use crate::rod::RodSettings;
 
 /// Answer of one inverse, with everything found.
+///
+/// ```
+/// use tdcr::inverse::{Bounds, InverseSettings, RodInverse};
+/// use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let inverse = RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default())?;
+/// // The disks as they are at rest.
+/// let positions: Vec<_> =
+///     robot.rest_frames().iter().skip(1).map(|frame| Some(frame.translation)).collect();
+/// let found = inverse.solve_positions(&positions, None, None)?;
+/// assert!(found.message.is_empty() && found.displacements.iter().all(|d| d.abs() < 1e-8));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Inversion {
     /// Outcome; among wanted positions of disks its distance is the largest of a disk.

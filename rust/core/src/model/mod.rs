@@ -14,6 +14,29 @@ pub use shape::Shape;
 pub use state::{Report, State};
 
 /// A robot prepared for one forward model.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings, Plan};
+/// use tdcr::model::Model;
+///
+/// // Works with any model.
+/// fn tip_height<M: Model>(model: &M, displacements: &[f64]) -> Result<f64, tdcr::InvalidInput> {
+///     let mut scratch = M::Scratch::default();
+///     model.solve(displacements, &mut scratch)?;
+///     Ok(model.state(&scratch).frames.last().map_or(0.0, |tip| tip.translation.z))
+/// }
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let height = tip_height(&ConstantCurvature::new(&robot, &plan), &[0.0; 3])?;
+/// assert!((height - 0.2).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 pub trait Model: Sync {
     /// Name used in Python and in messages.
     const NAME: &'static str;
@@ -45,7 +68,7 @@ pub trait Model: Sync {
         work: &mut Self::Scratch,
     ) -> Result<Report, InvalidInput>;
 
-    /// As [`Model::solve`], from what the last solve of this model left in `work`, where the model can
+    /// Solves from the last solve of this model in `work`, where the model can
     /// start from that.
     ///
     /// # Errors
@@ -100,8 +123,7 @@ pub trait Model: Sync {
         _start: Option<&State>,
         _work: &mut Self::Scratch,
     ) -> Result<Result<Matrix6xX<f64>, Report>, InvalidInput> {
-        let expected = "a model with derivatives (\"rod\" or \"constant_curvature\")";
-        Err(InvalidInput::new("model", expected, format!("\"{}\"", Self::NAME)))
+        Err(no_derivatives(Self::NAME))
     }
 
     /// The solved quantities of the last solve in `work`.
@@ -110,7 +132,7 @@ pub trait Model: Sync {
     /// The buffers' quantities, taken out of them.
     fn take_state(&self, work: Self::Scratch) -> State;
 
-    /// What stood in the way of the last solve, in a sentence; empty when it converged.
+    /// Reason why the last solve did not converge, in a sentence; empty when it did.
     fn message(&self, displacements: &[f64], work: &Self::Scratch) -> String;
 
     /// Solves once and builds the whole result.
@@ -139,4 +161,11 @@ pub fn rod_only(argument: &str, model: &str) -> InvalidInput {
         "none, or model \"rod\"",
         format!("{argument} for model \"{model}\""),
     )
+}
+
+/// Error for the Jacobian of a model that has none.
+#[must_use]
+pub fn no_derivatives(model: &str) -> InvalidInput {
+    let expected = "a model with derivatives (\"rod\" or \"constant_curvature\")";
+    InvalidInput::new("model", expected, format!("\"{model}\""))
 }

@@ -42,6 +42,7 @@ pub(crate) fn _forward_batch<'py>(
     warm: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let settings = model_settings(model, settings)?;
+    settings.check_warm(warm).map_err(|e| invalid(&e))?;
     let around = Surroundings::new(py, Some(obstacles), loads)?;
     let core = &robot.get().0;
     let tendons = core.tendons().len();

@@ -55,6 +55,7 @@ pub(crate) fn jacobian(
     start: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Py<PyAny>> {
     let settings = model_settings(model, settings)?;
+    settings.check_derivatives().map_err(|e| invalid(&e))?;
     let displacements = one_row(robot, displacements)?;
     let core = &robot.get().0;
     let start = start.map(|start| start_state(core, &settings, start)).transpose()?;

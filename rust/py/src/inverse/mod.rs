@@ -275,7 +275,7 @@ pub(crate) fn _inverse_places(
         around.stopped_by(&control.stop);
         let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
         let start = start.map(begin).transpose()?;
-        inverse.solve_places(&places, start.as_ref(), Some(&control.stop))
+        inverse.solve_positions(&places, start.as_ref(), Some(&control.stop))
     })?;
     raise_fault(py, inverse.take_fault())?;
     let found = found.map_err(|e| invalid(&e))?;
@@ -322,7 +322,7 @@ pub(crate) fn _inverse_solutions(
     let target = one_target(target)?;
     inverse.check_target(&target).map_err(|e| invalid(&e))?;
     let solutions = interruptible::run(py, None, |control| {
-        inverse.solutions_in(&target, &mut inverse.workspace().stopped_by(&control.stop))
+        inverse.solutions_in(&target, &mut inverse.scratch().stopped_by(&control.stop))
     })?;
     let rows = solutions.iter().map(|solution| {
         let unknown = vec![f64::NAN; solution.displacements.len()];
