@@ -48,7 +48,7 @@ mod _core {
     #[pymodule_export]
     use crate::inverse::cartesian_path::cartesian_path;
     #[pymodule_export]
-    use crate::inverse::{_inverse, _inverse_places, _inverse_solutions};
+    use crate::inverse::{_inverse, _inverse_solutions};
     #[pymodule_export]
     use crate::planar::inverse::{
         _planar_clearance, _planar_inverse_defaults, _planar_newton, _planar_newton_batch,

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 
 use tdcr::forward::{Forward, Load, ModelSettings, Plan};
 use tdcr::inverse::{
-    Answer, ConstantCurvatureInverse, Inversion, Inverter, Method, RodInverse, Target, invert,
+    Answer, ConstantCurvatureInverse, Inversion, Inverter, Method, RodInverse, invert,
 };
 use tdcr::model::rod_only;
 use tdcr::rod::contact::Scene;
@@ -157,13 +157,14 @@ fn row(
     ))
 }
 
-/// One inverse.
+/// One inverse, for a target or for positions of the disks.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // The keywords of inverse.
 pub(crate) fn _inverse(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
-    target: &Bound<'_, PyAny>,
+    target: Option<&Bound<'_, PyAny>>,
+    positions: Option<&Bound<'_, PyAny>>,
     model: &str,
     start: Option<&Bound<'_, PyAny>>,
     bounds: Option<&Bound<'_, PyAny>>,
@@ -176,24 +177,28 @@ pub(crate) fn _inverse(
     let around = Surroundings::new(py, Some(obstacles), loads)?;
     let plans = Plans::new(robot, model, settings, &around)?;
     let engine = plans.engine(robot, bounds, search, method)?;
-    let target = one_target(target)?;
-    let found = match &engine {
-        Engine::Arcs(inverse) => {
+    let found = match (&engine, positions) {
+        (Engine::Arcs(_), Some(_)) => return Err(invalid(&rod_only("positions", model))),
+        (Engine::Arcs(inverse), None) => {
             let time = estimated_microseconds(inverse.settings(), MICROSECONDS_PER_ARC_STEP);
-            invert_one(py, &**inverse, &target, start, &around, time)?
+            invert_one(py, &**inverse, target, start, &around, time)?
         }
-        Engine::Rod(inverse) => {
+        (Engine::Rod(inverse), positions) => {
             // Among obstacles there is no bound.
             let time = match around.any() {
                 None => estimated_microseconds(inverse.settings(), MICROSECONDS_PER_ROD_STEP),
                 Some(_) => f64::INFINITY,
             };
             // First: an interrupt stops the functions of obstacles too.
-            let found = invert_one(py, &**inverse, &target, start, &around, time)?;
+            let found = match positions {
+                Some(positions) => invert_positions(py, inverse, positions, start, &around)?,
+                None => invert_one(py, &**inverse, target, start, &around, time)?,
+            };
             raise_fault(py, inverse.take_fault())?;
             found
         }
     };
+    let found = found.map_err(|e| invalid(&e))?;
     with_shape(py, robot, found, model_settings(model, settings)?, around)
 }
 
@@ -249,54 +254,41 @@ fn wanted_places(
     .collect()
 }
 
-/// One inverse for places of the disks.
-#[pyfunction]
-#[allow(clippy::too_many_arguments)] // The keywords of inverse.
-pub(crate) fn _inverse_places(
-    py: Python<'_>,
-    robot: &Bound<'_, Robot>,
-    positions: &Bound<'_, PyAny>,
-    model: &str,
-    start: Option<&Bound<'_, PyAny>>,
-    bounds: Option<&Bound<'_, PyAny>>,
-    settings: Option<&Bound<'_, PyAny>>,
-    search: Option<&Bound<'_, InverseSettings>>,
-    method: &str,
-    obstacles: &Bound<'_, PyAny>,
-    loads: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Row, Option<Shape>)> {
-    let around = Surroundings::new(py, Some(obstacles), loads)?;
-    let plans = Plans::new(robot, model, settings, &around)?;
-    let engine = plans.engine(robot, bounds, search, method)?;
-    let Engine::Rod(inverse) = &engine else { return Err(invalid(&rod_only("positions", model))) };
-    let places = wanted_places(&robot.get().0, positions)?;
-    let start = one_start(inverse.robot(), start)?;
-    let found = interruptible::run(py, None, |control| {
-        around.stopped_by(&control.stop);
-        let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
-        let start = start.map(begin).transpose()?;
-        inverse.solve_positions(&places, start.as_ref(), Some(&control.stop))
-    })?;
-    raise_fault(py, inverse.take_fault())?;
-    let found = found.map_err(|e| invalid(&e))?;
-    with_shape(py, robot, found, model_settings(model, settings)?, around)
-}
-
 fn invert_one<I: Inverter>(
     py: Python<'_>,
     inverse: &I,
-    target: &Target,
+    target: Option<&Bound<'_, PyAny>>,
     start: Option<&Bound<'_, PyAny>>,
     around: &Surroundings,
     microseconds: f64,
-) -> PyResult<Inversion> {
-    inverse.check_target(target).map_err(|e| invalid(&e))?;
+) -> PyResult<Result<Inversion, InvalidInput>> {
+    let Some(target) = target else {
+        return Ok(Err(InvalidInput::new("target", "a target or positions", "neither")));
+    };
+    let target = one_target(target)?;
+    inverse.check_target(&target).map_err(|e| invalid(&e))?;
     let start = one_start(inverse.robot(), start)?;
-    let found = interruptible::run_if_long(py, microseconds, |control| {
+    interruptible::run_if_long(py, microseconds, |control| {
         around.stopped_by(&control.stop);
-        invert(inverse, target, start.as_deref(), Some(&control.stop))
-    })?;
-    found.map_err(|e| invalid(&e))
+        invert(inverse, &target, start.as_deref(), Some(&control.stop))
+    })
+}
+
+fn invert_positions(
+    py: Python<'_>,
+    inverse: &RodInverse<'_>,
+    positions: &Bound<'_, PyAny>,
+    start: Option<&Bound<'_, PyAny>>,
+    around: &Surroundings,
+) -> PyResult<Result<Inversion, InvalidInput>> {
+    let positions = wanted_places(inverse.robot(), positions)?;
+    let start = one_start(inverse.robot(), start)?;
+    interruptible::run(py, None, |control| {
+        around.stopped_by(&control.stop);
+        let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
+        let start = start.map(begin).transpose()?;
+        inverse.solve_positions(&positions, start.as_ref(), Some(&control.stop))
+    })
 }
 
 /// All answers of one target, least bending energy first, each with the number of starts that led there.
