@@ -90,7 +90,7 @@ impl Scene {
         }
         let loaded = moment != Vector3::zeros() || forces.iter().any(|f| *f != Vector3::zeros());
         Ok(Self {
-            obstacles: obstacles.iter().map(|obstacle| obstacle.transform_by(&base)).collect(),
+            obstacles: obstacles.iter().map(|obstacle| obstacle.transformed(&base)).collect(),
             points: points.collect(),
             forces,
             moment,
