@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Near, compose_without_negative_zeros, tightest_first, within};
+use super::{Near, moved, tightest_first, within};
 use crate::error::{self, InvalidInput, finite_vector, length};
 use crate::lie::Pose;
 
@@ -66,8 +66,8 @@ impl Cuboid {
         self.pose.rotation
     }
 
-    pub(super) fn transform_by(&self, pose: &Pose) -> Self {
-        Self { pose: compose_without_negative_zeros(pose, &self.pose), ..*self }
+    pub(super) fn transformed(&self, pose: &Pose) -> Self {
+        Self { pose: moved(pose, &self.pose), ..*self }
     }
 
     fn local(&self, x: &Vector3<f64>) -> Vector3<f64> {
@@ -106,18 +106,18 @@ impl Cuboid {
         if clear < 2 || from.norm() < super::KINK {
             return self.face(&x, nearest, sign);
         }
-        Near::round(&from, &across, 0.0, from).rotate_by(&self.pose.rotation).of(code(side))
+        Near::round(&from, &across, 0.0, from).rotated(&self.pose.rotation).of(code(side))
     }
 
     /// Every face of the lumen within reach, or the nearest: the inside is their intersection.
     pub(super) fn lumen(&self, x: &Vector3<f64>, reach: f64, out: &mut Vec<Near>) {
-        let nearest = self.near(x).flip_if(true);
+        let nearest = self.near(x).flipped(true);
         let within = within(nearest.distance, reach);
         let x = self.local(x);
         let start = out.len();
         for axis in 0..3 {
             for sign in [1.0, -1.0] {
-                let face = self.face(&x, axis, sign).flip_if(true);
+                let face = self.face(&x, axis, sign).flipped(true);
                 if face.distance <= within {
                     out.push(face);
                 }

@@ -70,7 +70,7 @@ impl Near {
     }
 
     /// Condition seen from the other side.
-    fn flip_if(self, flip: bool) -> Self {
+    fn flipped(self, flip: bool) -> Self {
         if !flip {
             return self;
         }
@@ -78,7 +78,7 @@ impl Near {
         Self { distance: -self.distance, gradient, hessian, feature: self.feature }
     }
 
-    fn rotate_by(self, rotation: &Matrix3<f64>) -> Self {
+    fn rotated(self, rotation: &Matrix3<f64>) -> Self {
         let gradient = rotation * self.gradient;
         Self { gradient, hessian: rotation * self.hessian * rotation.transpose(), ..self }
     }
@@ -170,15 +170,15 @@ impl Obstacle {
 
     /// Obstacle moved with its frame: given in the frame `pose`, seen from outside that frame.
     #[must_use]
-    pub fn transform_by(&self, pose: &Pose) -> Self {
+    pub fn transformed(&self, pose: &Pose) -> Self {
         let volume = match &self.volume {
-            Volume::Sphere(v) => v.transform_by(pose).into(),
-            Volume::Cylinder(v) => v.transform_by(pose).into(),
-            Volume::HalfSpace(v) => v.transform_by(pose).into(),
-            Volume::Capsule(v) => v.transform_by(pose).into(),
-            Volume::Cuboid(v) => v.transform_by(pose).into(),
-            Volume::Mesh(v) => v.transform_by(pose).into(),
-            Volume::SignedDistance(v) => v.transform_by(pose).into(),
+            Volume::Sphere(v) => v.transformed(pose).into(),
+            Volume::Cylinder(v) => v.transformed(pose).into(),
+            Volume::HalfSpace(v) => v.transformed(pose).into(),
+            Volume::Capsule(v) => v.transformed(pose).into(),
+            Volume::Cuboid(v) => v.transformed(pose).into(),
+            Volume::Mesh(v) => v.transformed(pose).into(),
+            Volume::SignedDistance(v) => v.transformed(pose).into(),
         };
         Self { volume, inside: self.inside }
     }
@@ -200,7 +200,7 @@ impl Obstacle {
             Volume::Mesh(v) => v.near(x),
             Volume::SignedDistance(v) => v.near(x)?,
         };
-        Ok(near.flip_if(self.inside))
+        Ok(near.flipped(self.inside))
     }
 
     /// Appends the conditions that together say, near `x`, that a point is where it may be: all that a
@@ -224,7 +224,7 @@ impl Obstacle {
             Volume::Cuboid(cuboid) if self.inside => cuboid.lumen(x, reach, out),
             Volume::Mesh(mesh) => mesh.constraints(x, reach, self.inside, out),
             Volume::SignedDistance(function) => {
-                out.push(function.near_with_hessian(x, reach)?.flip_if(self.inside));
+                out.push(function.curved(x, reach)?.flipped(self.inside));
             }
             _ => out.push(self.nearest(x)?),
         }
@@ -269,7 +269,7 @@ fn tightest_first(entries: &mut [Near]) {
 }
 
 /// A rigid motion without negative zeros, so that equal obstacles have equal bits.
-fn compose_without_negative_zeros(pose: &Pose, inner: &Pose) -> Pose {
+fn moved(pose: &Pose, inner: &Pose) -> Pose {
     let pose = pose.compose(inner);
     let (rotation, translation) =
         (pose.rotation.map(|e| e + 0.0), pose.translation.map(|e| e + 0.0));
@@ -277,11 +277,11 @@ fn compose_without_negative_zeros(pose: &Pose, inner: &Pose) -> Pose {
 }
 
 /// A place moved, without negative zeros.
-fn transform_point(pose: &Pose, point: &Vector3<f64>) -> Vector3<f64> {
+fn moved_point(pose: &Pose, point: &Vector3<f64>) -> Vector3<f64> {
     pose.transform(point).map(|e| e + 0.0)
 }
 
 /// A direction turned, without negative zeros.
-fn rotate_direction(pose: &Pose, direction: &Vector3<f64>) -> Vector3<f64> {
+fn turned(pose: &Pose, direction: &Vector3<f64>) -> Vector3<f64> {
     (pose.rotation * direction).map(|e| e + 0.0)
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Near, compose_without_negative_zeros};
+use super::{Near, moved};
 use crate::error::InvalidInput;
 use crate::lie::Pose;
 
@@ -95,11 +95,8 @@ impl SignedDistance {
         Self { function, pose: Pose::identity() }
     }
 
-    pub(super) fn transform_by(&self, pose: &Pose) -> Self {
-        Self {
-            function: self.function.clone(),
-            pose: compose_without_negative_zeros(pose, &self.pose),
-        }
+    pub(super) fn transformed(&self, pose: &Pose) -> Self {
+        Self { function: self.function.clone(), pose: moved(pose, &self.pose) }
     }
 
     /// A number that clones share and no other function has.
@@ -127,12 +124,12 @@ impl SignedDistance {
     }
 
     pub(super) fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
-        Ok(self.evaluate(&self.local(x))?.rotate_by(&self.pose.rotation))
+        Ok(self.evaluate(&self.local(x))?.rotated(&self.pose.rotation))
     }
 
     /// With the Hessian within reach of the surface: central differences of the gradient, whose step of
     /// ε^(1/4) suits gradients that are differences themselves.
-    pub(super) fn near_with_hessian(&self, x: &Vector3<f64>, reach: f64) -> Result<Near, Fault> {
+    pub(super) fn curved(&self, x: &Vector3<f64>, reach: f64) -> Result<Near, Fault> {
         let x = self.local(x);
         let mut near = self.evaluate(&x)?;
         if near.distance.abs() <= reach {
@@ -145,7 +142,7 @@ impl SignedDistance {
             }
             near.hessian = (columns + columns.transpose()) / 2.0;
         }
-        Ok(near.rotate_by(&self.pose.rotation))
+        Ok(near.rotated(&self.pose.rotation))
     }
 }
 

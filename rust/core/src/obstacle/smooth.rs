@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Near, rotate_direction, transform_point};
+use super::{Near, moved_point, turned};
 use crate::error::{InvalidInput, direction, finite_vector, length};
 use crate::lie::Pose;
 
@@ -46,8 +46,8 @@ impl Sphere {
         self.radius
     }
 
-    pub(super) fn transform_by(&self, pose: &Pose) -> Self {
-        Self { center: transform_point(pose, &self.center), ..*self }
+    pub(super) fn transformed(&self, pose: &Pose) -> Self {
+        Self { center: moved_point(pose, &self.center), ..*self }
     }
 
     /// At the centre the gradient is the world's x axis.
@@ -108,9 +108,8 @@ impl Cylinder {
         self.radius
     }
 
-    pub(super) fn transform_by(&self, pose: &Pose) -> Self {
-        let (point, axis) =
-            (transform_point(pose, &self.point), rotate_direction(pose, &self.axis));
+    pub(super) fn transformed(&self, pose: &Pose) -> Self {
+        let (point, axis) = (moved_point(pose, &self.point), turned(pose, &self.axis));
         Self { point, axis, ..*self }
     }
 
@@ -160,11 +159,8 @@ impl HalfSpace {
         self.normal
     }
 
-    pub(super) fn transform_by(&self, pose: &Pose) -> Self {
-        Self {
-            point: transform_point(pose, &self.point),
-            normal: rotate_direction(pose, &self.normal),
-        }
+    pub(super) fn transformed(&self, pose: &Pose) -> Self {
+        Self { point: moved_point(pose, &self.point), normal: turned(pose, &self.normal) }
     }
 
     pub(super) fn near(&self, x: &Vector3<f64>) -> Near {
@@ -223,8 +219,8 @@ impl Capsule {
         self.radius
     }
 
-    pub(super) fn transform_by(&self, pose: &Pose) -> Self {
-        Self { a: transform_point(pose, &self.a), b: transform_point(pose, &self.b), ..*self }
+    pub(super) fn transformed(&self, pose: &Pose) -> Self {
+        Self { a: moved_point(pose, &self.a), b: moved_point(pose, &self.b), ..*self }
     }
 
     /// On the segment the gradient is as on a cylinder's axis; of a single point, as in a sphere's centre.

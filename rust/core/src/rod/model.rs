@@ -68,7 +68,8 @@ pub struct Scratch {
 /// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
 /// # let robot = Robot::new(backbone, tendons, None, None, None)?;
 /// let plan = Plan::new(&robot, RodSettings::default())?;
-/// let shape = Rod::new(&robot, &plan).shape(&[-0.005, 0.0, 0.0])?;
+/// // One tendon is pulled, the others are free.
+/// let shape = Rod::new(&robot, &plan).shape(&[-0.005, f64::INFINITY, f64::INFINITY])?;
 /// assert_eq!(shape.report.status, tdcr::Status::Converged);
 /// assert!(shape.state.tensions.iter().all(|tension| *tension >= 0.0));
 /// # Ok(())

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::{Near, compose_without_negative_zeros, tightest_first};
+use super::{Near, moved, tightest_first};
 use crate::error::InvalidInput;
 use crate::hashing::Bits;
 use crate::lie::Pose;
@@ -63,11 +63,8 @@ impl Mesh {
         &self.surface.faces
     }
 
-    pub(super) fn transform_by(&self, pose: &Pose) -> Self {
-        Self {
-            surface: self.surface.clone(),
-            pose: compose_without_negative_zeros(pose, &self.pose),
-        }
+    pub(super) fn transformed(&self, pose: &Pose) -> Self {
+        Self { surface: self.surface.clone(), pose: moved(pose, &self.pose) }
     }
 
     pub(super) fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
@@ -84,7 +81,7 @@ impl Mesh {
     }
 
     pub(super) fn near(&self, x: &Vector3<f64>) -> Near {
-        self.surface.near(&self.local(x)).rotate_by(&self.pose.rotation)
+        self.surface.near(&self.local(x)).rotated(&self.pose.rotation)
     }
 
     /// See [`super::Obstacle::constraints`].
@@ -98,7 +95,7 @@ impl Mesh {
         let start = out.len();
         self.surface.constraints(&self.local(x), reach, inside, out);
         for entry in &mut out[start..] {
-            *entry = entry.rotate_by(&self.pose.rotation);
+            *entry = entry.rotated(&self.pose.rotation);
         }
         tightest_first(&mut out[start..]);
     }
