@@ -1,7 +1,7 @@
 //! The engine of `forward_batch`.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex};
 
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
@@ -12,6 +12,7 @@ use tdcr::batch::{Field, Key, Solved, chain_rows, pool, solve_rows};
 use tdcr::constant_curvature::ConstantCurvature;
 use tdcr::linkage::Linkage;
 use tdcr::model::Model;
+use tdcr::obstacle::FirstFault;
 use tdcr::rod::Rod;
 use tdcr::rod::contact::LoadedRod;
 use tdcr::{InvalidInput, Status};
@@ -22,7 +23,7 @@ use crate::convert::interruptible;
 use crate::forward::model_choice::{Choice, not_around};
 use crate::robot::Robot;
 use crate::scene::contact;
-use crate::scene::{self, Surroundings, Watched};
+use crate::scene::{self, Surroundings};
 
 /// Names of the fields a batch can have.
 #[pyfunction]
@@ -81,14 +82,15 @@ pub(crate) fn _forward_batch<'py>(
             if around.any().is_some() {
                 let scene = around.scene(core, &plan, &settings).map_err(|e| invalid(&e))?;
                 let rod = LoadedRod::new(core, &plan, &scene).map_err(|e| invalid(&e))?;
-                let fault = Mutex::new(None);
-                let watched = |stop| {
+                let mut first_fault = FirstFault::default();
+                let rod = |stop| {
                     around.stopped_by(&stop);
-                    Watched::new(rod, stop, &fault)
+                    first_fault = FirstFault::raising(stop);
+                    rod.reporting_to(&first_fault)
                 };
                 // After Ctrl-C, which is raised here, functions fail because of it.
-                let solved = batch.solve(py, watched, progress)?;
-                scene::checked(py, fault)?;
+                let solved = batch.solve(py, rod, progress)?;
+                scene::checked(py, first_fault.take())?;
                 return export(py, &batch, solved);
             }
             let rod = |stop| Rod::new(core, &plan).stopped_by(stop);

@@ -15,6 +15,7 @@ use tdcr::InvalidInput;
 use tdcr::constant_curvature::ConstantCurvature;
 use tdcr::linkage::Linkage;
 use tdcr::model::Model;
+use tdcr::rod::contact::LoadedRod;
 
 use crate::convert::arrays::{float_array, invalid, values, wrong_shape};
 use crate::forward::model_choice::{Choice, not_around, rod_only};
@@ -113,7 +114,7 @@ pub(crate) fn forward(
                 (None, load) => rod::run(py, core, &plan, |rod| rod::solve(rod, load, start))?,
                 (Some(_), load) => {
                     let scene = around.scene(core, &plan, &settings).map_err(|e| invalid(&e))?;
-                    let solve = |rod: &scene::Watched<'_>| rod.solve_load(load, start);
+                    let solve = |rod: &LoadedRod<'_>| scene::solve_load(rod, load, start);
                     Ok(scene::solve(py, core, &plan, &scene, solve)?)
                 }
             }

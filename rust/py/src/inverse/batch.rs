@@ -1,7 +1,5 @@
 //! The engine of `inverse_batch` and `track`; their docstrings are in Python.
 
-use std::sync::Mutex;
-
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -58,7 +56,7 @@ pub(crate) fn _inverse_batch<'py>(
         }
         Engine::Rod(inverse) => {
             let rows = invert_many(py, &**inverse, &targets, start, pool, progress, &around)?;
-            checked(py, Mutex::new(inverse.take_fault()))?;
+            checked(py, inverse.take_fault())?;
             Ok(rows)
         }
     }

@@ -4,8 +4,8 @@ pub(crate) mod batch;
 pub(crate) mod cartesian_path;
 pub(crate) mod targets;
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex};
 
 use nalgebra::Vector3;
 use numpy::PyUntypedArrayMethods;
@@ -15,7 +15,7 @@ use tdcr::inverse::{
     Answer, ConstantCurvatureInverse, Inverter, Method, Placed, RodInverse, Target,
 };
 use tdcr::model::State;
-use tdcr::rod::contact::Scene;
+use tdcr::rod::contact::{LoadedRod, Scene};
 use tdcr::{InvalidInput, constant_curvature, rod};
 
 use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
@@ -25,7 +25,7 @@ use crate::forward::rod::Load;
 use crate::forward::shape::Shape;
 use crate::inverse::targets::one_target;
 use crate::robot::Robot;
-use crate::scene::{self, Surroundings, Watched, checked};
+use crate::scene::{self, Surroundings, checked};
 use crate::settings::InverseSettings;
 use crate::settings::bounds::Bounds;
 
@@ -190,7 +190,7 @@ pub(crate) fn _inverse(
             let soon = around.any().is_none() && soon(inverse.settings(), ROD);
             // First: an interrupt stops the functions of obstacles too.
             let found = invert_one(py, &**inverse, &target, start, &around, soon)?;
-            checked(py, Mutex::new(inverse.take_fault()))?;
+            checked(py, inverse.take_fault())?;
             found
         }
     };
@@ -209,7 +209,7 @@ fn with_shape(
     let shape = match (state, plans) {
         (Some(state), Plans::Rod(plan, Some(scene))) => {
             let load = Load::Displacements(displacements.clone());
-            let solve = |rod: &Watched<'_>| rod.solve_load(load, Some(state));
+            let solve = |rod: &LoadedRod<'_>| scene::solve_load(rod, load, Some(state));
             let (given, shape) = scene::solve(py, &robot.get().0, plan, scene, solve)?;
             Some(Shape::new(robot.get().clone(), choice, given, shape).among(around))
         }
@@ -276,7 +276,7 @@ pub(crate) fn _inverse_places(
         let start = start.map(begin).transpose()?;
         inverse.solve_places(&places, start.as_ref(), Some(&control.stop))
     })?;
-    checked(py, Mutex::new(inverse.take_fault()))?;
+    checked(py, inverse.take_fault())?;
     let Placed { answer, displacements, tensions, message, state } =
         found.map_err(|e| invalid(&e))?;
     let found = ((displacements, tensions, answer, message), state);

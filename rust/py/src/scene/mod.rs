@@ -9,14 +9,14 @@ pub(crate) mod signed_distance;
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use tdcr::InvalidInput;
-use tdcr::model::{Model, Report, State};
-use tdcr::obstacle::{Fault, Obstacle, SignedDistance, Volume};
+use tdcr::model::{Model as _, State};
+use tdcr::obstacle::{Fault, FirstFault, Obstacle, SignedDistance, Volume};
 use tdcr::robot::Robot;
 use tdcr::rod::contact::{LoadedRod, Scene, Scratch};
 use tdcr::rod::{Plan, RodSettings};
@@ -131,104 +131,36 @@ fn listening(obstacle: Obstacle, index: Option<usize>, stop: &Stop) -> Obstacle 
     Obstacle::new(function, obstacle.inside())
 }
 
-/// A rod among obstacles whose first fault ends all work.
-pub(crate) struct Watched<'r> {
-    rod: LoadedRod<'r>,
-    stop: Arc<AtomicBool>,
-    fault: &'r Mutex<Option<Fault>>,
-}
-
-impl<'r> Watched<'r> {
-    pub(crate) fn new(
-        rod: LoadedRod<'r>,
-        stop: Arc<AtomicBool>,
-        fault: &'r Mutex<Option<Fault>>,
-    ) -> Self {
-        Self { rod: rod.stopped_by(Arc::clone(&stop)), stop, fault }
-    }
-
-    /// Displacements and the shape, found from rest or from an earlier shape.
-    pub(crate) fn solve_load(
-        &self,
-        load: Load,
-        start: Option<State>,
-    ) -> Result<(Vec<f64>, tdcr::Shape), InvalidInput> {
-        let mut work = Scratch::default();
-        let report = match (&load, start) {
-            (Load::Tensions(tensions), _) => self.rod.solve_tensions(tensions, &mut work)?,
-            (Load::Displacements(displacements), None) => {
-                let shape = self.shape(displacements)?;
-                return Ok((displacements.clone(), shape));
-            }
-            (Load::Displacements(displacements), Some(start)) => {
-                self.rod.robot().check_displacements(displacements)?;
-                self.rod.solve_from(&start, displacements, &mut work)?
-            }
-        };
-        self.watch(&mut work);
-        let message = self.rod.message(&[], &work);
-        let state = self.rod.take_state(work);
-        let displacements = match load {
-            Load::Displacements(displacements) => displacements,
-            Load::Tensions(_) => self.rod.displacements(&state),
-        };
-        Ok((displacements, tdcr::Shape { state, report, message }))
-    }
-
-    fn watch(&self, work: &mut Scratch) {
-        if let Some(fault) = work.take_fault() {
-            self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(fault);
-            // After that: what others fail with because of it comes too late.
-            self.stop.store(true, Ordering::SeqCst);
+/// Displacements and the shape of a load, found from rest or from an earlier shape.
+pub(crate) fn solve_load(
+    rod: &LoadedRod<'_>,
+    load: Load,
+    start: Option<State>,
+) -> Result<(Vec<f64>, tdcr::Shape), InvalidInput> {
+    let mut work = Scratch::default();
+    let report = match (&load, start) {
+        (Load::Tensions(tensions), _) => rod.solve_tensions(tensions, &mut work)?,
+        (Load::Displacements(displacements), None) => {
+            let shape = rod.shape(displacements)?;
+            return Ok((displacements.clone(), shape));
         }
-    }
-}
-
-impl Model for Watched<'_> {
-    type Scratch = Scratch;
-
-    fn robot(&self) -> &Robot {
-        self.rod.robot()
-    }
-
-    fn strain_width(&self) -> usize {
-        self.rod.strain_width()
-    }
-
-    fn elements(&self) -> usize {
-        self.rod.elements()
-    }
-
-    fn solve(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
-        let report = self.rod.solve(displacements, work)?;
-        self.watch(work);
-        Ok(report)
-    }
-
-    fn resume(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
-        let report = self.rod.resume(displacements, work)?;
-        self.watch(work);
-        Ok(report)
-    }
-
-    fn state<'w>(&self, work: &'w Scratch) -> &'w State {
-        self.rod.state(work)
-    }
-
-    fn take_state(&self, work: Scratch) -> State {
-        self.rod.take_state(work)
-    }
-
-    fn message(&self, displacements: &[f64], work: &Scratch) -> String {
-        self.rod.message(displacements, work)
-    }
+        (Load::Displacements(displacements), Some(start)) => {
+            rod.robot().check_displacements(displacements)?;
+            rod.solve_from(&start, displacements, &mut work)?
+        }
+    };
+    let message = rod.message(&[], &work);
+    let state = rod.take_state(work);
+    let displacements = match load {
+        Load::Displacements(displacements) => displacements,
+        Load::Tensions(_) => rod.displacements(&state),
+    };
+    Ok((displacements, tdcr::Shape { state, report, message }))
 }
 
 /// Raises the fault that work ended with, if it did.
-pub(crate) fn checked(py: Python<'_>, fault: Mutex<Option<Fault>>) -> PyResult<()> {
-    let Some(fault) = fault.into_inner().unwrap_or_else(PoisonError::into_inner) else {
-        return Ok(());
-    };
+pub(crate) fn checked(py: Python<'_>, fault: Option<Fault>) -> PyResult<()> {
+    let Some(fault) = fault else { return Ok(()) };
     Err(match fault.downcast::<Named>() {
         Ok(named) => raised(py, named.fault, Some(&format!("obstacles[{}]", named.obstacle))),
         Err(fault) => raised(py, fault, None),
@@ -244,18 +176,18 @@ pub(crate) fn solve<T: Send>(
     robot: &Robot,
     plan: &Plan,
     scene: &Scene,
-    job: impl FnOnce(&Watched<'_>) -> Result<T, InvalidInput> + Send,
+    job: impl FnOnce(&LoadedRod<'_>) -> Result<T, InvalidInput> + Send,
 ) -> PyResult<T> {
-    let fault = Mutex::new(None);
     let rod = LoadedRod::new(robot, plan, scene).map_err(|e| invalid(&e))?;
+    let mut first_fault = FirstFault::default();
     let shape = if scene.calls_functions() || plan.second_derivatives() < LONG {
-        py.detach(|| job(&Watched::new(rod, Arc::default(), &fault)))
+        py.detach(|| job(&rod.reporting_to(&first_fault)))
     } else {
         interruptible::run(py, None, |control| {
-            let stop = &control.stop;
-            job(&Watched::new(rod, Arc::clone(stop), &fault))
+            first_fault = FirstFault::raising(Arc::clone(&control.stop));
+            job(&rod.reporting_to(&first_fault))
         })?
     };
-    checked(py, fault)?;
+    checked(py, first_fault.take())?;
     shape.map_err(|e| invalid(&e))
 }

@@ -108,7 +108,6 @@ impl RodInverse<'_> {
         };
         let answer = ended(found, &mut pull, &mut search, |goal| (goal.misses().0, 0.0));
         let (most, mean, disk) = pull.aim.misses();
-        self.note_fault(pull.rod.as_mut(), rise.as_mut());
         let held = self.held(&search.point, &pull);
         let message = match answer.status {
             Status::Converged => rise.map_or("", |rise| rise.message()).to_owned(),

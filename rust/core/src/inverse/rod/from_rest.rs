@@ -7,7 +7,6 @@ use crate::inverse::multistart::{Effort, Found, Freedom, Search};
 use crate::inverse::tension_problem::{Goal, Pull};
 use crate::lie::{Pose, so3};
 use crate::model::Model as _;
-use crate::obstacle::Fault;
 use crate::robot::Robot;
 use crate::rod::contact::{LoadedRod, Scratch};
 use crate::status::Status;
@@ -140,10 +139,6 @@ impl<'a> Rise<'a> {
             return "";
         }
         "met on a way through other shapes: from rest the same displacements lead to another shape (start from answer.shape)"
-    }
-
-    pub(super) fn take_fault(&mut self) -> Option<Fault> {
-        self.work.take_fault()
     }
 }
 

@@ -7,8 +7,8 @@ mod path;
 mod starts;
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Vector2, Vector3};
 
@@ -23,7 +23,7 @@ use super::tension_problem::Pull;
 use super::{InverseSettings, Method, Target};
 use crate::error::InvalidInput;
 use crate::model::{Model, State};
-use crate::obstacle::Fault;
+use crate::obstacle::{Fault, FirstFault};
 use crate::robot::Robot;
 use crate::rod::contact::{self, LoadedRod, Scene};
 use crate::rod::equilibrium::FreeRod;
@@ -69,8 +69,8 @@ pub struct RodInverse<'a> {
     arcs: Option<ConstantCurvatureInverse<'a>>,
     /// Among obstacles and under loads.
     loaded: Option<LoadedRod<'a>>,
-    /// The first fault of an obstacle's function.
-    fault: Arc<Mutex<Option<Fault>>>,
+    /// Cell for the first fault of an obstacle's function.
+    first_fault: FirstFault,
 }
 
 /// No tension is more than what would bend the rod by two turns alone, unless bounds ask for it \[rad\]: targets just out
@@ -118,7 +118,7 @@ impl<'a> RodInverse<'a> {
             rest,
             arcs: ConstantCurvatureInverse::guessing(robot, &settings),
             loaded: None,
-            fault: Arc::default(),
+            first_fault: FirstFault::default(),
         };
         inverse.bound(bounds);
         Ok(inverse)
@@ -130,36 +130,14 @@ impl<'a> RodInverse<'a> {
     /// As [`LoadedRod::new`].
     pub fn among(self, scene: &'a Scene) -> Result<Self, InvalidInput> {
         let loaded = LoadedRod::new(self.robot, self.rest.plan(), scene)?;
+        let loaded = loaded.reporting_to(&self.first_fault);
         Ok(Self { loaded: Some(loaded), ..self })
     }
 
     /// What a function of an obstacle ended all work with, if it did.
     #[must_use]
     pub fn take_fault(&self) -> Option<Fault> {
-        self.fault.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
-
-    /// Solves unless a function of an obstacle failed before, and keeps its fault if it does now.
-    fn watched(
-        &self,
-        work: &mut RodScratch<'_>,
-        solve: impl FnOnce(&mut RodScratch<'_>) -> Answer,
-    ) -> Answer {
-        let fault = || self.fault.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.loaded.is_some() && fault().is_some() {
-            return Answer::none();
-        }
-        let answer = solve(work);
-        self.note_fault(work.pull.rod.as_mut(), work.rise.as_mut());
-        answer
-    }
-
-    /// Keeps the first fault of an obstacle's function.
-    fn note_fault(&self, rod: &mut dyn Equilibrium, rise: Option<&mut Rise<'_>>) {
-        let own = rise.and_then(Rise::take_fault);
-        if let Some(new) = rod.take_fault().or(own) {
-            self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(new);
-        }
+        self.first_fault.take()
     }
 
     /// The robot under tensions, at rest.
@@ -312,22 +290,23 @@ impl Inverter for RodInverse<'_> {
 
     /// The start is a shape with its tensions.
     fn solve(&self, target: &Target, start: Option<&State>, work: &mut RodScratch<'_>) -> Answer {
-        self.watched(work, |work| {
-            work.pull.forget();
-            let given = if let Some(state) = start {
-                work.pull.rod.begin(state)
-            } else {
-                work.pull.rod.rest();
-                false
-            };
-            self.search(target, given, self.effort(self.settings.starts), work)
-        })
+        if self.first_fault.is_set() {
+            return Answer::none();
+        }
+        work.pull.forget();
+        let given = if let Some(state) = start {
+            work.pull.rod.begin(state)
+        } else {
+            work.pull.rod.rest();
+            false
+        };
+        self.search(target, given, self.effort(self.settings.starts), work)
     }
 
     /// In steps between which the tool is moved and turned evenly, where one step does not lead there without a
     /// jump; from a few other starts only when that fails, and then `starts` is more than 1.
     fn follow(&self, target: &Target, work: &mut RodScratch<'_>) -> Answer {
-        self.watched(work, |work| self.go_on(target, work))
+        if self.first_fault.is_set() { Answer::none() } else { self.go_on(target, work) }
     }
 
     fn write_tensions(&self, work: &RodScratch<'_>, place: &mut [f64]) {

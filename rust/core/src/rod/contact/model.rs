@@ -11,7 +11,7 @@ use crate::error::InvalidInput;
 use crate::lie::Pose;
 use crate::model::Contact;
 use crate::model::{Model, Report, State};
-use crate::obstacle::{Fault, Near};
+use crate::obstacle::{Fault, FirstFault, Near};
 use crate::robot::Robot;
 use crate::rod::dual_newton::Ending;
 use crate::rod::model::{Rod, read_state, told, write_state};
@@ -56,6 +56,7 @@ pub struct LoadedRod<'r> {
     scene: &'r Scene,
     /// Length of the shortest subsegment \[m\].
     pub(in crate::rod) shortest: f64,
+    first_fault: Option<FirstFault>,
 }
 
 impl<'r> LoadedRod<'r> {
@@ -70,13 +71,30 @@ impl<'r> LoadedRod<'r> {
         }
         let lengths = (0..plan.data.len()).map(|i| plan.length(i));
         let shortest = lengths.fold(f64::INFINITY, f64::min);
-        Ok(Self { rod: Rod::new(robot, plan), scene, shortest })
+        Ok(Self { rod: Rod::new(robot, plan), scene, shortest, first_fault: None })
     }
 
     /// The same, whose solves end soon after the flag is set, with the status of an iteration limit.
     #[must_use]
     pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
         Self { rod: self.rod.stopped_by(stop), ..self }
+    }
+
+    /// Rod whose faults go to a cell, rather than stay in the buffers, and whose solves end soon after the cell's
+    /// flag is set.
+    #[must_use]
+    pub fn reporting_to(self, first_fault: &FirstFault) -> Self {
+        let rod = self.rod.stopped_by(Arc::clone(first_fault.stop()));
+        Self { rod, first_fault: Some(first_fault.clone()), ..self }
+    }
+
+    /// Moves the fault of a solve to the cell that collects faults, if there is one.
+    pub(in crate::rod) fn report_fault(&self, work: &mut Scratch) {
+        if let Some(first_fault) = &self.first_fault
+            && let Some(fault) = work.fault.take()
+        {
+            first_fault.keep(fault);
+        }
     }
 
     pub(in crate::rod) fn plan(&self) -> &'r Plan {
@@ -128,7 +146,9 @@ impl<'r> LoadedRod<'r> {
     ) -> Result<Report, InvalidInput> {
         self.plan().check_tensions(tensions)?;
         let tensions = tensions.iter().map(|tension| tension / self.plan().unit).collect();
-        Ok(self.rise(&TendonTarget::Tensions(tensions), work, self.rod.stop.as_deref()))
+        let report = self.rise(&TendonTarget::Tensions(tensions), work, self.rod.stop.as_deref());
+        self.report_fault(work);
+        Ok(report)
     }
 
     /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
@@ -241,7 +261,9 @@ impl<'r> LoadedRod<'r> {
         work: &mut Scratch,
         stop: Option<&AtomicBool>,
     ) -> Report {
-        self.rise(&self.lengths(displacements), work, stop)
+        let report = self.rise(&self.lengths(displacements), work, stop);
+        self.report_fault(work);
+        report
     }
 
     fn rise(&self, wanted: &TendonTarget, work: &mut Scratch, stop: Option<&AtomicBool>) -> Report {
@@ -300,6 +322,7 @@ impl Model for LoadedRod<'_> {
             self.climb(&wanted, Some(&from), work, budget, self.rod.stop.as_deref())
         });
         let over = work.fault.is_some() || work.ending == Ending::Stopped;
+        self.report_fault(work);
         if report.status == Status::Converged || over {
             return Ok(report);
         }

@@ -88,7 +88,6 @@ impl<'r> ContactRod<'r> {
     /// Climbs from the undeformed robot, without loads; where that leads.
     fn set_out(&mut self, tensions: &[f64]) -> Point {
         let Self { rod, work, .. } = self;
-        work.fault = None;
         rod.begin(work);
         let mut budget = rod.plan().settings.max_iterations;
         let given = TendonTarget::Tensions(tensions.to_vec());
@@ -101,6 +100,7 @@ impl<'r> ContactRod<'r> {
     fn arrived(&mut self, led: Result<(), Fault>, tensions: Vec<f64>) -> Point {
         if let Err(fault) = led {
             self.work.fault = Some(fault);
+            self.rod.report_fault(&mut self.work);
             return Point::default();
         }
         let sound = self.work.ending == Ending::Converged;
@@ -255,10 +255,6 @@ impl Equilibrium for ContactRod<'_> {
 
     fn state(&mut self) -> Option<State> {
         self.held.then(|| self.rod.written(&mut self.work).clone())
-    }
-
-    fn take_fault(&mut self) -> Option<Fault> {
-        self.work.fault.take()
     }
 }
 

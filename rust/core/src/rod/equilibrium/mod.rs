@@ -12,7 +12,6 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::lie::Pose;
 use crate::model::State;
-use crate::obstacle::Fault;
 
 pub(crate) use contact::ContactRod;
 pub(crate) use free::FreeRod;
@@ -58,11 +57,6 @@ pub(crate) trait Equilibrium: Debug {
 
     /// The shape at hand, where tensions do not say which one it is.
     fn state(&mut self) -> Option<State> {
-        None
-    }
-
-    /// What a function of an obstacle ended the work with, if it did.
-    fn take_fault(&mut self) -> Option<Fault> {
         None
     }
 }
