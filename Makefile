@@ -2,6 +2,7 @@
 # make test   everything that CI runs
 # make bench  criterion benches and side-by-side runs against other tools
 # make figures remakes the papers' figures into examples/figures/
+# make house  counts comments, words and arrows of the code
 # make docs   builds the guide into site/
 
 PYTHON ?= python3
@@ -17,7 +18,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-.PHONY: help demo test bench figures docs guide tools rust-checks rust-tests package python-checks python-tests runs clean
+.PHONY: help demo test bench house figures docs guide tools rust-checks rust-tests package python-checks python-tests runs clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -78,6 +79,10 @@ python-checks: package
 
 python-tests: package
 	$(BIN)/pytest
+
+# Counts and arrows; `make house HOUSE="--list all"` lists the places, `--against COMMIT` compares.
+house:
+	@$(PYTHON) tests/python/house $(HOUSE)
 
 # What a user runs: the demo, the examples, the side-by-side comparison (once, in small), from the
 # installed wheel.

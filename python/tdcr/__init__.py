@@ -16,7 +16,8 @@ tendon's length inside the robot: negative pulls.
 from __future__ import annotations
 
 from tdcr import constant_curvature, design, planar, pso
-from tdcr._batch import ShapeBatch, forward_batch
+from tdcr._base.public import set_home as _set_home
+from tdcr._base.status import Status
 from tdcr._core import (
     Backbone,
     Bounds,
@@ -48,9 +49,11 @@ from tdcr._core import (
     sensitivity,
 )
 from tdcr._core import __version__ as __version__
-from tdcr._dexterity import Manipulability, manipulability
-from tdcr._gripper import Grasp, Gripper
-from tdcr._inverse import (
+from tdcr._forward.batch import ShapeBatch, forward_batch
+from tdcr._forward.sensitivity import Gradient, Variation
+from tdcr._forward.sweep import Sweep, sweep
+from tdcr._gripper.gripper import Grasp, Gripper
+from tdcr._inverse.solve import (
     Inverse,
     InverseBatch,
     inverse,
@@ -58,13 +61,11 @@ from tdcr._inverse import (
     inverse_solutions,
     track,
 )
-from tdcr._measurements import Measurements, read_measurements
-from tdcr._sensitivity import Gradient, Variation
-from tdcr._status import Status
-from tdcr._sweep import Sweep, sweep
-from tdcr._voxels import Volume, VoxelMap
-from tdcr._workspace import workspace
-from tdcr._workspace_results import Reach, Workspace
+from tdcr._workspace.manipulability import Manipulability, manipulability
+from tdcr._workspace.results import Reach, Workspace
+from tdcr._workspace.sample import workspace
+from tdcr._workspace.voxels import Volume, VoxelMap
+from tdcr.design.measurements import Measurements, read_measurements
 from tdcr.errors import InvalidInput, NotConverged, TdcrError
 
 __all__ = [
@@ -128,3 +129,5 @@ __all__ = [
     "track",
     "workspace",
 ]
+
+_set_home(__name__, map(globals().get, __all__))

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
-from tdcr._sensitivity import Gradient, Variation
-from tdcr._status import Status
+from tdcr._base.status import Status
+from tdcr._forward.sensitivity import Gradient, Variation
 
 __all__ = [
     "Backbone",

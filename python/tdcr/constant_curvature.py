@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from tdcr import _core
-from tdcr._value import rebuilt
+from tdcr._base.value import rebuilt
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:

@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tdcr import _core
+from tdcr._base.progress import told
+from tdcr._base.status import Status
+from tdcr._base.value import Value
 from tdcr._core import PsoSettings
-from tdcr._progress import told
-from tdcr._status import Status
-from tdcr._value import Value
 from tdcr.errors import NotConverged
 
 if TYPE_CHECKING:

@@ -77,7 +77,7 @@ def straight():
 
 def batch(**options):
     rows = np.random.default_rng(0).uniform(-0.01, 0, (5, 1)) * [1, 0, 0] + [0, math.inf, math.inf]
-    return tdcr.forward_batch(straight(), rows, fields=tdcr._batch.FIELDS, **options)
+    return tdcr.forward_batch(straight(), rows, fields=tdcr._forward.batch.FIELDS, **options)
 
 
 def touching_batch():
@@ -109,10 +109,10 @@ RESULTS = {
     "touching batch": touching_batch,
     "no rows": lambda: tdcr.forward_batch(straight(), np.empty((0, 3)), fields=("tip", "strains")),
     "no rows of all": lambda: tdcr.forward_batch(
-        straight(), np.empty((0, 3)), fields=tdcr._batch.FIELDS
+        straight(), np.empty((0, 3)), fields=tdcr._forward.batch.FIELDS
     ),
     "no tendons": lambda: tdcr.forward_batch(
-        tdcr.Robot(tdcr.Backbone(0.1, 1), []), np.empty((3, 0)), fields=tdcr._batch.FIELDS
+        tdcr.Robot(tdcr.Backbone(0.1, 1), []), np.empty((3, 0)), fields=tdcr._forward.batch.FIELDS
     ),
     "workspace": workspace,
     "workspace with fields": lambda: workspace(fields=("frames", "strains", "energy"), seed=4),

@@ -178,7 +178,9 @@ def test_the_demo_solves_the_bundled_robots(tmp_path):
 
 
 def test_a_demo_that_does_not_converge_exits_1(monkeypatch, capsys):
-    monkeypatch.setattr("tdcr._cli._demo.DEMO", (("elephant_trunk", (-0.07, 0.0, 0.0, 0.0)),))
+    monkeypatch.setattr(
+        "tdcr._cli.commands.demo.DEMO", (("elephant_trunk", (-0.07, 0.0, 0.0, 0.0)),)
+    )
     assert main(["demo"]) == 1
     out, err = capsys.readouterr()
     assert "infeasible" in out

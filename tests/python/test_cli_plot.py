@@ -94,7 +94,7 @@ def test_an_animation_that_is_interrupted_is_not_written(
 ):
     """Before the first frame too, when there is nothing to write."""
     pytest.importorskip("matplotlib")
-    from tdcr import _animate
+    from tdcr._plot import animation
 
     drawn = []
 
@@ -103,7 +103,7 @@ def test_an_animation_that_is_interrupted_is_not_written(
             raise KeyboardInterrupt
         drawn.append(step)
 
-    monkeypatch.setattr(_animate, "_frame", frame)
+    monkeypatch.setattr(animation, "_frame", frame)
     before = set(tmp_path.iterdir())
     command = ["plot", robot, "--pull", "-0.01 free free", "--animate", "p.gif"]
     assert main(command) == 130
@@ -138,7 +138,7 @@ def test_an_interrupt_that_the_garbage_collector_swallows_ends_an_animation(
     robot, tmp_path, capsys, monkeypatch
 ):
     pytest.importorskip("matplotlib")
-    from tdcr import _animate
+    from tdcr._plot import animation
 
     class Dropped:
         def __del__(self):
@@ -152,7 +152,7 @@ def test_an_interrupt_that_the_garbage_collector_swallows_ends_an_animation(
             Dropped()
         time.sleep(0.005)
 
-    monkeypatch.setattr(_animate, "_frame", frame)
+    monkeypatch.setattr(animation, "_frame", frame)
     command = ["plot", robot, "--pull", "-0.01 free free", "--frames", "200"]
     before = set(tmp_path.iterdir())
     assert main([*command, "--animate", "p.gif"]) == 130

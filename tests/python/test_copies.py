@@ -10,7 +10,7 @@ import pytest
 from saved_results import RESULTS, SHAPES, workspace
 
 import tdcr
-from tdcr._value import Value
+from tdcr._base.value import Value
 
 # Named tuples are not compared whole: their arrays have no one answer.
 TUPLES = {

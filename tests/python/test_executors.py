@@ -14,7 +14,7 @@ from concurrent.futures import (
 import pytest
 
 import tdcr
-from tdcr import _chunks
+from tdcr._forward import chunks
 
 ROBOT = tdcr.Robot(
     tdcr.Backbone([0.06, 0.06], [4, 4]),
@@ -173,7 +173,7 @@ def test_workers_have_a_core_each_and_what_is_left_has_all(threads, away, here, 
         used.append(options["threads"])
         return solve(*args, **options)
 
-    monkeypatch.setattr(_chunks, "forward_batch", told)
+    monkeypatch.setattr(chunks, "forward_batch", told)
     with pytest.warns(RuntimeWarning, match="no worker left"):
         found = sample(chunk=400, executor=Broken(), threads=threads)
     # The first one has no row, and checks what is given.

@@ -17,8 +17,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdcr import Backbone, InvalidInput, Robot, Tendon
-from tdcr._file_schema import BackboneTable, metres
-from tdcr._files import load_robot, robot_schema, save_robot
+from tdcr._io.robot_file import load_robot, robot_schema, save_robot
+from tdcr._io.robot_schema import BackboneTable, metres
 
 GOOD = """
 format = 1

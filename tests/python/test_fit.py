@@ -10,7 +10,7 @@ import pytest
 
 import tdcr
 from tdcr import design
-from tdcr._fit_model import Measured, Problem
+from tdcr.design.fit_problem import Measured, Problem
 
 NOISE = 2e-4
 ROWS = 60

@@ -9,8 +9,8 @@ import pytest
 from example_scripts import example_script
 
 import tdcr
-from tdcr._force_closure import positively_span, wrenches
-from tdcr._placing import turned
+from tdcr._gripper.force_closure import positively_span, wrenches
+from tdcr._gripper.placing import turned
 
 BALL = tdcr.Sphere((0, 0, 0.14), 0.04)
 
@@ -280,12 +280,12 @@ def test_pictures(grasp, tmp_path):
 def test_a_closing_that_is_interrupted_is_not_written(done, there, grasp, tmp_path, monkeypatch):
     """Before the first frame too, when there is nothing to write; an older file stays."""
     pytest.importorskip("matplotlib")
-    from tdcr import _plot_gripper
+    from tdcr._plot import grasp as grasp_pictures
 
     path = tmp_path / "closing.gif"
     if there:
         path.write_bytes(b"older")
-    plot, drawn = _plot_gripper.plot_grasp, []
+    plot, drawn = grasp_pictures.plot_grasp, []
 
     def interrupted(shown, step, *others):
         if len(drawn) == done:
@@ -293,7 +293,7 @@ def test_a_closing_that_is_interrupted_is_not_written(done, there, grasp, tmp_pa
         drawn.append(step)
         return plot(shown, step, *others)
 
-    monkeypatch.setattr(_plot_gripper, "plot_grasp", interrupted)
+    monkeypatch.setattr(grasp_pictures, "plot_grasp", interrupted)
     with pytest.raises(KeyboardInterrupt):
         grasp.animate(path)
     assert drawn == list(range(done))

@@ -12,7 +12,7 @@ import pytest
 
 import tdcr
 from tdcr import Backbone, InvalidInput, Robot, Tendon, forward
-from tdcr._view import plane_of, smooth
+from tdcr._plot.projection import plane_of, smooth
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
@@ -20,8 +20,8 @@ matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 
-from tdcr._plot import plot_shape, save_picture  # noqa: E402
-from tdcr._plot_obstacles import surface  # noqa: E402
+from tdcr._plot.obstacles import surface  # noqa: E402
+from tdcr._plot.shape import plot_shape, save_picture  # noqa: E402
 
 INF = math.inf
 

@@ -10,7 +10,7 @@ import pytest
 from example_scripts import example_script
 
 import tdcr
-from tdcr._voxels import Grid, solid_angles, volume
+from tdcr._workspace.voxels import Grid, solid_angles, volume
 
 ROBOT = tdcr.Robot(
     tdcr.Backbone([0.06, 0.06], [4, 4]),

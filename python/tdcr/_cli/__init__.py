@@ -16,15 +16,15 @@ from io import TextIOWrapper
 import click
 
 from tdcr import InvalidInput, __version__
-from tdcr._cli import _shared as own
-from tdcr._cli._click import Commands, Interrupted, Unread
-from tdcr._cli._demo import demo
-from tdcr._cli._design import design
-from tdcr._cli._fit import fit
-from tdcr._cli._forward import forward, schema
-from tdcr._cli._inverse import inverse, track
-from tdcr._cli._plot import plot
-from tdcr._cli._workspace import workspace
+from tdcr._cli import options as own
+from tdcr._cli.click_types import Commands, Interrupted, Unread
+from tdcr._cli.commands.demo import demo
+from tdcr._cli.commands.design import design
+from tdcr._cli.commands.fit import fit
+from tdcr._cli.commands.forward import forward, schema
+from tdcr._cli.commands.inverse import inverse, track
+from tdcr._cli.commands.plot import plot
+from tdcr._cli.commands.workspace import workspace
 
 __all__ = ["main"]
 

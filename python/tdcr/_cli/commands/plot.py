@@ -1,0 +1,162 @@
+"""``tdcr plot``."""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+import tdcr
+from tdcr import InvalidInput, Inverse, InverseBatch, Robot, Shape, ShapeBatch, Workspace
+from tdcr._cli import options as own
+from tdcr._cli.click_types import Command
+
+__all__ = ["plot"]
+
+
+@click.command(
+    "plot",
+    cls=Command,
+    epilog=own.examples(
+        "plot trunk.toml --pull -15 free free free -5 free --unit mm --output pulled.png",
+        "plot trunk.toml --pull -15 free free free -9 free --unit mm --animate pull.gif",
+    ),
+)
+@click.argument("file", type=own.FILE)
+@click.option(
+    "-o",
+    "--output",
+    callback=own.writable,
+    metavar="FILE",
+    help="The picture: .png, .pdf, .svg, ...",
+)
+@click.option(
+    "--animate",
+    callback=own.writable,
+    metavar="FILE",
+    help="Of a robot: a GIF of the pull, from rest.",
+)
+@own.displacements_option(required=False)
+@own.model_option("rod", "linkage", "constant_curvature")
+@own.unit_option("the displacements")
+@click.option(
+    "--view",
+    type=click.Choice(["auto", "2d", "3d"]),
+    default="auto",
+    show_default=True,
+    help="In the plane of the bend, or in space. A workspace is cut by a plane but for 3d.",
+)
+@click.option("--row", type=int, metavar="ROW", help="Of a batch or a track: which row.")
+@click.option(
+    "--frames",
+    type=click.IntRange(2, 500),
+    default=40,
+    show_default=True,
+    help="Steps of the animation.",
+)
+@click.pass_context
+def plot(
+    context: click.Context,
+    file: Path,
+    output: str | None,
+    animate: str | None,
+    displacements: list[float] | None,
+    model: str,
+    unit: str,
+    view: str,
+    row: int | None,
+    frames: int,
+) -> int:
+    """Draw what is in FILE: a robot, or a result that was saved.
+
+    A robot (.toml, .json) is drawn under --pull, or at rest; results are shapes, inverses, batches
+    and workspaces (.npz, .json, .parquet).
+    """
+    if output is None and animate is None:
+        raise click.UsageError("expected --output FILE, --animate FILE or both")
+    own.checked_picture(output)
+    thing = _read(file)
+    if not isinstance(thing, Robot) and (displacements is not None or animate is not None):
+        got = f"{file} with a {type(thing).__name__}"
+        raise click.UsageError(f"--pull and --animate: expected a robot file, got {got}")
+    _used(context, thing)
+    if isinstance(thing, Workspace):
+        own.workspace_picture(thing, str(output), "3d" if view == "3d" else "section")
+        return 0
+    pulls = None if displacements is None else own.in_metres(displacements, unit)
+    if animate is not None:
+        _animate(thing, pulls, model, animate, frames)
+    shape = _shape(thing, pulls, model, row)
+    if output is not None:
+        from tdcr._plot.shape import save_picture
+
+        save_picture(shape, output, view=view)
+    doubt = own.unit_doubted(unit, own.largest(pulls or ()), shape.robot)
+    return own.said(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
+
+
+def _used(context: click.Context, thing: Any) -> None:
+    """Refuse options that would be without use."""
+    given = {
+        name
+        for name in ("model", "row", "frames", "unit")
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+    }
+    kind = type(thing).__name__
+    if "model" in given and not isinstance(thing, Robot):
+        raise click.UsageError(f"--model: expected a robot file, got a {kind}, which has its own")
+    if "row" in given and not isinstance(thing, (ShapeBatch, InverseBatch)):
+        raise click.UsageError(f"--row: expected a batch or a track, got {kind}")
+    if "unit" in given and context.params["displacements"] is None:
+        raise click.UsageError("--unit: expected --pull too")
+    if "frames" in given and context.params["animate"] is None:
+        raise click.UsageError("--frames: expected --animate FILE too")
+
+
+def _read(file: Path) -> Any:
+    """Read a robot or a result, whichever it is."""
+    if file.suffix.lower() == ".toml":
+        return Robot.load(file)
+    from tdcr._io.save_load import load_any
+
+    if file.suffix.lower() == ".json":
+        from tdcr._io.robot_file import parsed
+
+        data = parsed(file, file.read_bytes(), ".json")
+        if isinstance(data, dict) and "kind" not in data:
+            return Robot.load(file)
+    elif file.suffix.lower() not in (".npz", ".parquet"):
+        expected = "a file ending in .toml, .json, .npz or .parquet"
+        raise InvalidInput(f"file: expected {expected}, got '{file}'", "file")
+    return load_any(file)
+
+
+def _shape(thing: Any, pulls: list[float] | None, model: str, row: int | None) -> Shape:
+    """Shape to draw of a robot or a result."""
+    if isinstance(thing, (ShapeBatch, InverseBatch)):
+        if row is None or not -len(thing) <= row < len(thing):
+            expected = f"expected a row from 0 to {len(thing) - 1}"
+            raise click.UsageError(f"--row: {expected}, got {'none' if row is None else row}")
+        thing = thing[row]
+    if isinstance(thing, Robot):
+        return tdcr.forward(thing, pulls or [inf] * len(thing.tendons), model=model)
+    shape: Shape = thing.shape if isinstance(thing, Inverse) else thing
+    return shape
+
+
+def _animate(robot: Robot, pulls: list[float] | None, model: str, path: str, frames: int) -> None:
+    from tdcr._base.progress import told
+    from tdcr._plot.animation import animate_pull, check_gif, pulled_shapes
+
+    if pulls is None:
+        raise click.UsageError("--animate: expected --pull too")
+    check_gif(path)
+    # Checked as a whole before the first step.
+    tdcr.forward(robot, pulls, model=model)
+    with told(own.progress(), "plot", 2 * frames) as tell:
+        shapes = pulled_shapes(robot, np.array(pulls), model=model, count=frames, progress=tell)
+        shown = None if tell is None else (lambda done: tell(frames + done))
+        animate_pull(shapes, path, progress=shown)

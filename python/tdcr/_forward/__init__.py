@@ -1,0 +1,1 @@
+"""Many forward solves: batches, sweeps into files, derivatives."""

@@ -1,0 +1,1 @@
+"""Robots that close around an object."""

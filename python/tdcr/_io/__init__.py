@@ -1,0 +1,1 @@
+"""Files: robots, obstacles, meshes, measured columns, results. Knows no result by name."""

@@ -1,0 +1,1 @@
+"""Pictures of shapes, obstacles, workspaces, grasps and fits. Imported on first use."""

@@ -1,0 +1,1 @@
+"""Where a tip gets: samples, reach, volumes, manipulability."""

@@ -1,0 +1,406 @@
+"""Fits: parameters of a robot from measured positions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+
+import numpy as np
+
+from tdcr._base.status import Status
+from tdcr._base.value import Value
+from tdcr._core import Robot
+from tdcr.design.fit_checks import checked, far_off, unsolved, whole
+from tdcr.design.measurements import Measurements
+from tdcr.errors import InvalidInput, NotConverged
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tdcr._core import ConstantCurvatureSettings, Robot, RodSettings
+    from tdcr.design.fit_problem import Measured, Problem
+
+    Array: TypeAlias = NDArray[np.float64]
+    Part: TypeAlias = Literal["train", "validation"]
+
+__all__ = ["Fit", "fit"]
+
+# Relative fall of the cost, and relative step, below which a round has converged.
+_FALL, _STEP = 1e-7, 1e-8
+# Directions whose curvature is below this share of the largest are not told by the data.
+_BLIND = 1e-12
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Value):
+    """Parameters fitted to measurements, and how well. Arrays are read-only.
+
+    Rows without gaps and of finite displacements are the kept ones; all arrays are over these.
+    """
+
+    robot: Robot
+    """The robot with its fitted holes, rest shape, Poisson's ratio and base. Offsets and gains of
+    displacements are not part of a robot: see `displacements`."""
+    parameters: dict[str, Array]
+    """Values by name: "offset" (K,) [m], "gain" (K,), "radius" (K,) [m], "azimuth" (K,) [rad],
+    "stiffness" (K,) [N], "poisson_ratio" (1,), "rest" (2,) [1/m], "base" (6,) [m, rad]."""
+    standard_errors: dict[str, Array]
+    """Of each value, by the sandwich estimate; inf where the data do not tell it."""
+    residuals: Array
+    """Measured minus predicted positions, (rows, points, 3) [m]."""
+    residuals_before: Array
+    """The same with the robot as it was given."""
+    rows: NDArray[np.int64]
+    """Indices of the kept rows in the measurements."""
+    validation: NDArray[np.bool_]
+    """Which of the kept rows were held out."""
+    dropped: int
+    """Rows left out for their gaps (NaN)."""
+    failed: int
+    """Kept rows whose forward solve did not converge at the end; they count with the last
+    iterate."""
+    status: Status
+    """converged, or iteration_limit."""
+    message: str
+    """Whether steps still fell; how many forward solves failed; whether the root mean square
+    distance of the points fitted to is more than 10 times their median, which outliers make, or
+    more than 5 % of the robot's length: then the model is not of these measurements. Empty if none
+    of these."""
+    iterations: int
+    """Levenberg-Marquardt steps."""
+    seed: int
+    """Of the split."""
+
+    _hashed: ClassVar[tuple[str, ...]] = ("robot", "residuals", "seed")
+
+    @property
+    def ok(self) -> bool:
+        """Whether it converged."""
+        return self.status is Status.converged
+
+    def require(self) -> Fit:
+        """Return the result itself, or raise `NotConverged` with its message."""
+        if self.ok:
+            return self
+        raise NotConverged(f"{self.status}: {self.message}", self)
+
+    def distances(self, part: Part = "validation", *, before: bool = False) -> Array:
+        """Distances of predicted from measured points of a part of the rows, flat [m]."""
+        if part not in ("train", "validation"):
+            message = f'part: expected "train" or "validation", got {part!r}'
+            raise InvalidInput(message, "part")
+        residuals = self.residuals_before if before else self.residuals
+        rows = self.validation if part == "validation" else ~self.validation
+        flat: Array = np.linalg.norm(residuals[rows], axis=2).ravel()
+        return flat
+
+    def rms(self, part: Part = "validation", *, before: bool = False) -> float:
+        """Root of the mean squared distance of a part of the rows [m]; NaN for no rows."""
+        distances = self.distances(part, before=before)
+        return float(np.sqrt(np.mean(distances**2))) if distances.size else float("nan")
+
+    def mean(self, part: Part = "validation", *, before: bool = False) -> float:
+        """Mean distance of a part of the rows [m]; NaN for no rows."""
+        distances = self.distances(part, before=before)
+        return float(np.mean(distances)) if distances.size else float("nan")
+
+    def displacements(self, given: ArrayLike) -> Array:
+        """Displacements for `forward` on `robot` from those of the measurements, (..., K) [m]."""
+        count = len(self.robot.tendons)
+        gain = self.parameters.get("gain", np.ones(count))
+        shifted: Array = np.asarray(given, dtype=np.float64) * gain
+        return shifted + self.parameters.get("offset", np.zeros(count))
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw which share of the held-out points (all, if none were) is within a distance.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        if ax is None:
+            from matplotlib.figure import Figure
+
+            ax = Figure(layout="constrained").add_subplot()
+        part: Part = "validation" if self.validation.any() else "train"
+        for before, colour, label in ((True, "#9AA5B1", "before"), (False, "#C8553D", "after")):
+            distances = np.sort(self.distances(part, before=before)) * 1e3
+            share = np.arange(len(distances) + 1) / len(distances)
+            label = f"{label}, mean {self.mean(part, before=before) * 1e3:.3g} mm"
+            ax.step([0.0, *distances], share, where="post", color=colour, label=label)
+        whose = {"validation": "held-out", "train": "fitted"}[part]
+        ax.set(xlabel="distance [mm]", ylabel=f"share of the {whose} points", ylim=(0, 1.03))
+        ax.grid(True)
+        ax.legend(frameon=False)
+        return ax
+
+    def plot_residuals(self, axes: Any = None) -> Any:
+        """Draw measured minus predicted positions along x, y and z over the rows.
+
+        Outliers beyond twice what 99 % keep within are drawn at the edge and counted.
+
+        Parameters
+        ----------
+        axes : sequence of three matplotlib Axes, optional
+            One above the other.
+
+        Returns
+        -------
+        sequence of three matplotlib Axes
+        """
+        if axes is None:
+            from matplotlib.figure import Figure
+
+            axes = Figure(figsize=(7.0, 5.5), layout="constrained").subplots(3, sharex=True)
+        points = self.residuals.shape[1]
+        rows, held = np.repeat(self.rows, points), np.repeat(self.validation, points)
+        looks = [
+            (self.residuals_before, np.ones_like(held), "before", "#9AA5B1", "none"),
+            (self.residuals, ~held, "after, fitted to", "#2A6F97", "none"),
+            (self.residuals, held, "after, held out", "#C8553D", "#C8553D"),
+        ]
+        both = np.abs(np.concatenate([self.residuals_before, self.residuals])) * 1e3
+        limit = 2 * float(np.percentile(both, 99)) or 1.0
+        for c, axis in enumerate("xyz"):
+            ax = axes[c]
+            beyond = 0
+            for values, which, label, edge, face in looks:
+                if which.any():
+                    own = values[..., c].ravel()[which] * 1e3
+                    beyond += int((np.abs(own) > limit).sum())
+                    own = np.clip(own, -limit, limit)
+                    ax.scatter(
+                        rows[which],
+                        own,
+                        s=9,
+                        facecolors=face,
+                        edgecolors=edge,
+                        linewidths=0.7,
+                        label=label,
+                    )
+            ax.axhline(0, color="0.3", linewidth=0.8, zorder=0)
+            if beyond:
+                ax.text(0.99, 0.06, f"{beyond} beyond", transform=ax.transAxes, ha="right")
+            ax.set_ylabel(f"{axis} [mm]")
+            ax.grid(True, linewidth=0.4)
+        axes[0].set_title("measured minus predicted", fontsize=10)
+        axes[2].set_xlabel("row of the measurements")
+        ax = axes[0]
+        ax.legend(frameon=False, ncols=3, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1))
+        ax.title.set_horizontalalignment("left")
+        ax.title.set_x(0)
+        return axes
+
+    def __repr__(self) -> str:
+        """Tell what was fitted and how well."""
+        part: Part = "validation" if self.validation.any() else "train"
+        before, after = self.rms(part, before=True), self.rms(part)
+        names = ", ".join(self.parameters)
+        return f"<Fit of {names}, {self.status}, {part} rms {before:.3g} m before, {after:.3g} m>"
+
+
+def fit(
+    robot: Robot,
+    measurements: ArrayLike | Measurements,
+    parameters: Sequence[str],
+    *,
+    displacements: ArrayLike | None = None,
+    model: str = "rod",
+    settings: RodSettings | ConstantCurvatureSettings | None = None,
+    validation: float = 0.2,
+    seed: int = 0,
+    robust: bool = True,
+    max_iterations: int = 50,
+) -> Fit:
+    """Estimate parameters of a robot from measured positions under many pulls.
+
+    Levenberg-Marquardt steps on the distances between measured and predicted points: first least
+    squares, then, if `robust`, the soft-L1 loss with twice the median distance as its scale.
+    Derivatives are exact for the rod and the base (`sensitivity`), and central differences of the
+    constant-curvature model.
+
+    Parameters
+    ----------
+    robot : Robot
+        Where the fit starts. Its tool is what is measured if only one point is.
+    measurements : array_like, shape (B, 3) or (B, n + 1, 3), or Measurements
+        Positions of the tool point, or of all disks, world frame [m]. Rows with gaps (NaN) are
+        dropped and counted. What `tdcr.read_measurements` reads has the displacements with it.
+    parameters : sequence of str
+        What to estimate: "offset" and "gain" of each displacement (used are gain * displacement +
+        offset), "radius" and "azimuth" of each tendon's holes (straight tendons), "stiffness" of
+        each tendon (all elastic; positions tell its ratio to the backbone's), "poisson_ratio",
+        "rest" (a curvature about x and y, added to the rest shape), "base" (a shift, and a rotation
+        about the base's origin, world axes).
+    displacements : array_like, shape (B, K)
+        As for `forward_batch` [m]: negative pulls, `inf` is free. Not with `Measurements`.
+    model : {"rod", "constant_curvature"}, optional
+        The latter has no "stiffness", no "poisson_ratio" and no "rest".
+    settings : RodSettings or ConstantCurvatureSettings, optional
+    validation : float, optional
+        Share of the rows that is held out, in [0, 0.9].
+    seed : int, optional
+        Of the split.
+    robust : bool, optional
+    max_iterations : int, optional
+        Steps at most, of both rounds.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InvalidInput
+        Arrays of another shape, no rows, infinite measurements or such that are a million lengths
+        away, no row without gaps, fewer numbers than unknowns, a parameter that is unknown,
+        repeated, not one of the model's or of tendons that the robot does not have.
+    TypeError
+        A value of another type.
+    """
+    displacements, measurements = _paired(displacements, measurements)
+    problem, measured = checked(
+        robot, displacements, measurements, parameters, model, settings, validation
+    )
+    if not isinstance(robust, bool):
+        raise TypeError(f"robust: expected a bool, got {type(robust).__name__}")
+    max_iterations = whole("max_iterations", max_iterations, 1)
+    seed = whole("seed", seed, 0)
+    count = len(measured.points)
+    held = np.zeros(count, dtype=bool)
+    order = np.random.default_rng(seed).permutation(count)
+    held[order[: round(validation * count)]] = True
+    train = measured.only(~held)
+    if train.points.size <= problem.size:
+        raise InvalidInput(
+            f"measurements: expected more numbers to fit to than unknowns ({problem.size}), "
+            f"got {train.points.size}",
+            "measurements",
+        )
+    values = problem.start()
+    before, _ = problem.residuals(values, measured)
+    values, iterations, done = _descend(problem, train, values, np.inf, max_iterations)
+    scale = np.inf
+    if robust and done:
+        distances = np.linalg.norm(problem.residuals(values, train)[0], axis=2)
+        # Data without noise have no outliers either.
+        scale = max(2 * float(np.median(distances)), 1e-9 * robot.backbone.total_length)
+        rest = max_iterations - iterations
+        values, more, done = _descend(problem, train, values, scale, rest)
+        iterations += more
+    errors = _standard_errors(problem, train, values, scale)
+    after, solved = problem.residuals(values, measured)
+    status = Status.converged if done else Status.iteration_limit
+    parts = [] if done else [f"still falling after {iterations} iterations"]
+    failed = int(np.count_nonzero(~solved))
+    parts += problem.at_bounds(values)
+    parts += unsolved(failed, count)
+    parts += far_off(np.linalg.norm(after[~held], axis=2), robot.backbone.total_length)
+    for array in (after, before, measured.rows, held):
+        array.flags.writeable = False
+    return Fit(
+        robot=problem.robot(values),
+        parameters=problem.named(values),
+        standard_errors=problem.named(errors),
+        residuals=after,
+        residuals_before=before,
+        rows=measured.rows,
+        validation=held,
+        dropped=measured.dropped,
+        failed=failed,
+        status=status,
+        message="; ".join(parts),
+        iterations=iterations,
+        seed=seed,
+    )
+
+
+def _paired(
+    displacements: ArrayLike | None, measurements: ArrayLike | Measurements
+) -> tuple[ArrayLike, ArrayLike]:
+    """Give displacements and positions, of which measurements have both."""
+    if isinstance(measurements, Measurements):
+        if displacements is not None:
+            message = "displacements: expected none with Measurements, which have their own"
+            raise InvalidInput(message, "displacements")
+        return measurements.displacements, measurements.positions
+    if displacements is None:
+        raise TypeError("displacements: expected an array, or Measurements as measurements")
+    return displacements, measurements
+
+
+def _weights(residuals: Array, solved: NDArray[np.bool_], scale: float) -> tuple[Array, float]:
+    """Weights of the points (rows, points) and cost, of the soft-L1 loss."""
+    squares: Array = (residuals**2).sum(axis=2)
+    if np.isinf(scale):
+        weights: Array = np.repeat(solved[:, None], squares.shape[1], axis=1).astype(np.float64)
+        return weights, float(squares.sum())
+    root: Array = np.sqrt(1 + squares / scale**2)
+    weights = solved[:, None] / root
+    return weights, float((2 * scale**2 * (root - 1)).sum())
+
+
+def _descend(
+    problem: Problem, measured: Measured, values: Array, scale: float, budget: int
+) -> tuple[Array, int, bool]:
+    """Levenberg-Marquardt steps: values, steps taken, whether they converged."""
+    damping = 1e-4
+    residuals, solved = problem.residuals(values, measured)
+    weights, cost = _weights(residuals, solved, scale)
+    for iteration in range(budget):
+        jacobian = problem.jacobian(values, measured) / problem.scales[:, None, None, None]
+        weighted = jacobian * weights[:, :, None]
+        gram = np.einsum("aijk,bijk->ab", weighted, jacobian, optimize=True)
+        slope = np.einsum("aijk,ijk->a", weighted, residuals)
+        while True:
+            damped = gram + damping * np.diag(np.maximum(np.diag(gram), 1e-300))
+            step = np.linalg.lstsq(damped, slope, rcond=1e-14)[0]
+            small = np.abs(step).max() <= _STEP
+            moved = problem.bounded(values + step / problem.scales)
+            trial, trial_solved = problem.residuals(moved, measured)
+            trial_weights, trial_cost = _weights(trial, trial_solved, scale)
+            if trial_cost < cost:
+                break
+            damping *= 10
+            if small or damping > 1e10:
+                return values, iteration + 1, True
+        fall = (cost - trial_cost) / max(cost, 1e-300)
+        values, residuals, weights, cost = moved, trial, trial_weights, trial_cost
+        damping = max(damping / 10, 1e-12)
+        if fall < _FALL or small:
+            return values, iteration + 1, True
+    return values, budget, False
+
+
+def _standard_errors(problem: Problem, measured: Measured, values: Array, scale: float) -> Array:
+    """Root of the sandwich estimate's diagonal; rows are independent, points of a row are not.
+
+    Every row's residual is that of a fit without it, by its leverage: HC3 of MacKinnon & White
+    (1985), which holds for few rows too.
+    """
+    residuals, solved = problem.residuals(values, measured)
+    weights, _ = _weights(residuals, solved, scale)
+    count, numbers = len(residuals), residuals[0].size
+    jacobian = problem.jacobian(values, measured) / problem.scales[:, None, None, None]
+    # The loss is flatter along a residual than its weight says: its second derivative is
+    # w - w^3 r r^T / s^2.
+    along = np.einsum("aijk,ijk->aij", jacobian, residuals)
+    flatter = np.einsum("aij,ij,bij->ab", along, weights**3 / scale**2, along, optimize=True)
+    weighted = (jacobian * weights[:, :, None]).reshape(-1, count, numbers)
+    jacobian = jacobian.reshape(-1, count, numbers)
+    gram = np.einsum("aim,bim->ab", weighted, jacobian, optimize=True) - flatter
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    curvature, axes = np.linalg.eigh(gram / size / size[:, None])
+    seen = curvature > _BLIND * curvature[-1]
+    inverse = (axes[:, seen] / curvature[seen]) @ axes[:, seen].T / size / size[:, None]
+    leverage = np.einsum("aim,ab,bik->imk", jacobian, inverse, weighted, optimize=True)
+    without = np.linalg.pinv(np.eye(numbers) - leverage) @ residuals.reshape(count, numbers, 1)
+    scores = np.einsum("aim,im->ai", weighted, without[:, :, 0])
+    errors = np.sqrt(np.diag(inverse @ (scores @ scores.T) @ inverse))
+    blind = (np.abs(axes[:, ~seen]) > 1e-4).any(axis=1) | (np.diag(gram) == 0)
+    return np.where(blind, np.inf, errors / problem.scales)
