@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::plan::Plan;
 use super::subsegment::{Derivatives, Local, ROUNDING};
 use crate::lie::Pose;
-use crate::solve::bounded_program::Bounded;
-use crate::solve::quadratic_program::{backward, cholesky, dot, forward};
+use crate::solve::bounded_program::BoundedProgram;
+use crate::solve::dense::{backward, cholesky, dot, forward};
 
 /// Unknowns and the buffers of a Newton step.
 #[derive(Clone, Debug, Default)]
@@ -51,7 +51,7 @@ pub(super) struct Chain {
     reduced: Vec<f64>,
     right: Vec<f64>,
     least: Vec<f64>,
-    program: Bounded,
+    program: BoundedProgram,
     whole: Vec<f64>,
 }
 
@@ -92,7 +92,7 @@ impl Chain {
         let (width, elements) = (plan.unknowns(), plan.settings.elements);
         for data in &plan.data {
             for _ in 0..elements {
-                self.strains.extend_from_slice(&data.rest[..width]);
+                self.strains.extend_from_slice(&data.elasticity.rest()[..width]);
             }
         }
         self.tensions.clear();
@@ -197,10 +197,11 @@ impl Chain {
             loop {
                 self.local.place::<D>(kind, data, strains);
                 self.local.differentiate::<D, ONE>(data, pieces, strains, tensions, taut, &mut out);
-                let stable = factorize(out.hessian, &mut self.whole, size, data.stiffness[0]);
+                let stable =
+                    factorize(out.hessian, &mut self.whole, size, data.elasticity.bending());
                 let mut largest = 0.0_f64;
                 for (k, g) in out.gradient.iter().enumerate() {
-                    largest = largest.max(g.abs() / data.stiffness[k % D]);
+                    largest = largest.max(data.elasticity.strain_under(k % D, g.abs()));
                 }
                 round += 1;
                 let far = largest > balance || (!stable && largest > 1e-9);

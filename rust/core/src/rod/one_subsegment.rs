@@ -10,7 +10,7 @@ use super::dual_newton::EASY;
 use super::newton_system::{Chain, JUMP};
 use super::plan::Plan;
 use crate::lie::Pose;
-use crate::solve::quadratic_program::{backward, dot};
+use crate::solve::dense::{backward, dot};
 
 /// Newton steps per load step, and load steps are not made shorter.
 const PATIENCE: usize = 20;
@@ -47,7 +47,7 @@ impl Stage {
     /// Whether another subsegment bends in the same way between the same holes.
     pub(crate) fn alike(&self, other: &Self) -> bool {
         let (own, its) = (&self.part.data[0], &other.part.data[0]);
-        (own.length, own.stiffness, own.rest) == (its.length, its.stiffness, its.rest)
+        (own.length, own.elasticity) == (its.length, its.elasticity)
             && self.tendons == other.tendons
     }
 

@@ -12,7 +12,7 @@ use super::scene::Scene;
 use crate::obstacle::Fault;
 use crate::rod::dual_newton::Ending;
 use crate::rod::plan::Plan;
-use crate::solve::quadratic_program::dot;
+use crate::solve::dense::dot;
 
 /// So many steps below the value's rounding may pass without the moment halving.
 const BLIND: usize = 4;
@@ -351,7 +351,8 @@ impl Descent {
         let (width, data) = (plan.width(), &plan.data);
         let mut size = 0.0;
         for (k, escape) in self.escape.iter().enumerate() {
-            size += escape * escape * data[k / width].stiffness[k % width % plan.unknowns()];
+            let elasticity = &data[k / width].elasticity;
+            size += escape * escape * elasticity.stiffness(k % width % plan.unknowns());
         }
         dot(&self.slope, &self.escape).abs() <= SYMMETRIC * size
     }
