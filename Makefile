@@ -89,6 +89,7 @@ rust-checks: tools
 rust-tests: tools
 	cargo test --locked
 	cargo test --locked --benches
+	cargo run --locked --quiet --profile test --example bend_and_back
 
 # The sdist, and the wheel that pip makes of it, which the Python tests use: so it holds all it needs. Files that are as
 # they were keep their time, so that cargo compiles no more than what changed.

@@ -119,11 +119,10 @@ def inverse(
     if (target is None) == (positions is None):
         got = "neither" if target is None else "both"
         raise InvalidInput(f"target: expected a target or positions, got {got}", "target")
-    solve = _core._inverse if positions is None else _core._inverse_places
-    wanted = target if positions is None else positions
-    row, shape = solve(
+    row, shape = _core._inverse(
         robot,
-        wanted,  # type: ignore[arg-type]  # One of them is given.
+        target,
+        positions,
         model,
         _displacements(start),
         bounds,

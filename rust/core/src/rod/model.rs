@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix6xX, Vector3};
 
 use super::degenerate_rest;
 use super::dual_newton::{DualNewton, EASY, Ending};
@@ -73,67 +73,6 @@ impl<'r> Rod<'r> {
         &self.plan.rest_lengths
     }
 
-    /// Displacements under which a shape has the lengths and tensions that it has: what its tendons are
-    /// longer than at rest, without what tension stretches them \[m\].
-    #[must_use]
-    pub fn displacements(&self, state: &State) -> Vec<f64> {
-        let plan = self.plan;
-        let rows = state.tendon_lengths.iter().zip(&state.tensions);
-        let plans = plan.rest_lengths.iter().zip(&plan.compliance);
-        let change = |((own, tension), (rest, give)): ((&f64, &f64), (&f64, &f64))| {
-            own - give * tension / plan.unit - rest
-        };
-        rows.zip(plans).map(change).collect()
-    }
-
-    /// The shape under given tensions, in the unit of the results: displacements are then what it has. A
-    /// minimum that rest leads to as the tensions grow together; infeasible beyond where it ends.
-    ///
-    /// # Errors
-    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
-    pub fn solve_tensions(
-        &self,
-        tensions: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        let expected = "sliding tendons where tensions are given";
-        self.plan.settings.tendons.require_tensions("tendons", expected)?;
-        self.plan.check_tensions(tensions)?;
-        let mut budget = self.plan.settings.max_iterations;
-        self.listen(work);
-        let chain = &mut work.chain;
-        chain.rest(self.plan);
-        chain.unbound(self.plan);
-        chain.taut.clear();
-        chain.taut.extend(tensions.iter().map(|tension| *tension > 0.0));
-        work.reached.clone_from(&chain.strains);
-        let (mut load, mut stride) = (0.0, 1.0_f64);
-        work.ending = Ending::Converged;
-        while load < 1.0 {
-            let next = (load + stride).min(1.0);
-            for (own, wanted) in work.chain.tensions.iter_mut().zip(tensions) {
-                *own = next * wanted / self.plan.unit;
-            }
-            if self.settle(work, &mut budget) {
-                load = next;
-                stride *= 2.0;
-                work.reached.clone_from(&work.chain.strains);
-            } else {
-                work.chain.strains.clone_from(&work.reached);
-                stride = 0.5 * (next - load);
-                if budget == 0 || stride < SHORTEST {
-                    for (own, wanted) in work.chain.tensions.iter_mut().zip(tensions) {
-                        *own = load * wanted / self.plan.unit;
-                    }
-                    work.ending = if budget == 0 { Ending::Spent } else { Ending::Lost };
-                    work.left = work.chain.assemble(self.plan, EASY);
-                    break;
-                }
-            }
-        }
-        Ok(self.report(work, self.plan.settings.max_iterations - budget))
-    }
-
     /// Newton's method under given tensions from the point at hand; whether it converged to a minimum.
     fn settle(&self, work: &mut Scratch, budget: &mut usize) -> bool {
         let mut moved = 0.0;
@@ -156,24 +95,6 @@ impl<'r> Rod<'r> {
             }
         }
         false
-    }
-
-    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
-    /// elements; a start that does not help is dropped.
-    ///
-    /// # Errors
-    /// `InvalidInput` for a start with another number of strains.
-    pub fn solve_from(
-        &self,
-        start: &State,
-        displacements: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        work.chain.rest(self.plan);
-        let Chain { strains, tensions, .. } = &mut work.chain;
-        read_state(start, self.plan, strains, tensions)?;
-        work.ending = Ending::Converged;
-        self.resume(displacements, work)
     }
 
     /// From the strains and tensions at hand to the displacements; evaluations that took.
@@ -272,6 +193,8 @@ pub(super) fn told(ending: Ending, residual: f64, evaluations: usize) -> Report 
 }
 
 impl Model for Rod<'_> {
+    const NAME: &'static str = "rod";
+
     type Scratch = Scratch;
 
     fn robot(&self) -> &Robot {
@@ -301,6 +224,96 @@ impl Model for Rod<'_> {
             }
         }
         self.solve(displacements, work)
+    }
+
+    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
+    /// elements; a start that does not help is dropped.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a start with another number of strains.
+    fn solve_from(
+        &self,
+        start: &State,
+        displacements: &[f64],
+        work: &mut Scratch,
+    ) -> Result<Report, InvalidInput> {
+        work.chain.rest(self.plan);
+        let Chain { strains, tensions, .. } = &mut work.chain;
+        read_state(start, self.plan, strains, tensions)?;
+        work.ending = Ending::Converged;
+        self.resume(displacements, work)
+    }
+
+    /// The shape under given tensions, in the unit of the results: displacements are then what it has. A
+    /// minimum that rest leads to as the tensions grow together; infeasible beyond where it ends.
+    ///
+    /// # Errors
+    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
+    fn solve_tensions(&self, tensions: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
+        let expected = "sliding tendons where tensions are given";
+        self.plan.settings.tendons.require_tensions("tendons", expected)?;
+        self.plan.check_tensions(tensions)?;
+        let mut budget = self.plan.settings.max_iterations;
+        self.listen(work);
+        let chain = &mut work.chain;
+        chain.rest(self.plan);
+        chain.unbound(self.plan);
+        chain.taut.clear();
+        chain.taut.extend(tensions.iter().map(|tension| *tension > 0.0));
+        work.reached.clone_from(&chain.strains);
+        let (mut load, mut stride) = (0.0, 1.0_f64);
+        work.ending = Ending::Converged;
+        while load < 1.0 {
+            let next = (load + stride).min(1.0);
+            for (own, wanted) in work.chain.tensions.iter_mut().zip(tensions) {
+                *own = next * wanted / self.plan.unit;
+            }
+            if self.settle(work, &mut budget) {
+                load = next;
+                stride *= 2.0;
+                work.reached.clone_from(&work.chain.strains);
+            } else {
+                work.chain.strains.clone_from(&work.reached);
+                stride = 0.5 * (next - load);
+                if budget == 0 || stride < SHORTEST {
+                    for (own, wanted) in work.chain.tensions.iter_mut().zip(tensions) {
+                        *own = load * wanted / self.plan.unit;
+                    }
+                    work.ending = if budget == 0 { Ending::Spent } else { Ending::Lost };
+                    work.left = work.chain.assemble(self.plan, EASY);
+                    break;
+                }
+            }
+        }
+        Ok(self.report(work, self.plan.settings.max_iterations - budget))
+    }
+
+    /// Displacements under which a shape has the lengths and tensions that it has: what its tendons are
+    /// longer than at rest, without what tension stretches them \[m\].
+    fn displacements(&self, state: &State) -> Vec<f64> {
+        let plan = self.plan;
+        let rows = state.tendon_lengths.iter().zip(&state.tensions);
+        let plans = plan.rest_lengths.iter().zip(&plan.compliance);
+        let change = |((own, tension), (rest, give)): ((&f64, &f64), (&f64, &f64))| {
+            own - give * tension / plan.unit - rest
+        };
+        rows.zip(plans).map(change).collect()
+    }
+
+    fn jacobian(
+        &self,
+        displacements: &[f64],
+        start: Option<&State>,
+        work: &mut Scratch,
+    ) -> Result<Result<Matrix6xX<f64>, Report>, InvalidInput> {
+        let report = match start {
+            Some(start) => self.solve_from(start, displacements, work)?,
+            None => self.solve(displacements, work)?,
+        };
+        if report.status != Status::Converged {
+            return Ok(Err(report));
+        }
+        Ok(Ok(self.sensitivity(displacements, work).jacobian(self.robot.tool())))
     }
 
     fn state<'w>(&self, work: &'w Scratch) -> &'w State {

@@ -143,6 +143,12 @@ impl Plan {
         }
     }
 
+    /// Settings that it was made with.
+    #[must_use]
+    pub fn settings(&self) -> &RodSettings {
+        &self.settings
+    }
+
     /// How displacements are imposed.
     pub(crate) fn tendon_law(&self) -> TendonLaw {
         self.settings.tendons

@@ -54,6 +54,21 @@ pub(crate) fn run<T: Send>(
     Ok(answer)
 }
 
+/// Estimated microseconds from which a single solve listens for Ctrl-C; below, a thread would cost more than it is worth.
+const LONG: f64 = 1e6;
+
+/// Runs `job` with the GIL released: as [`run`] does if it may take long, else on this thread.
+pub(crate) fn run_if_long<T: Send>(
+    py: Python<'_>,
+    microseconds: f64,
+    job: impl FnOnce(&Control) -> T + Send,
+) -> PyResult<T> {
+    if microseconds < LONG {
+        return Ok(py.detach(|| job(&Control::default())));
+    }
+    run(py, None, job)
+}
+
 fn listen(py: Python<'_>, progress: Option<&Py<PyAny>>, control: &Control) -> PyResult<()> {
     py.check_signals()?;
     if let Some(callable) = progress {

@@ -7,11 +7,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use tdcr::design::{angle_at_base, points_on_curve, prebend_stopped_by};
+use tdcr::forward::{ModelSettings, Solution};
 use tdcr::rod::Subsegment;
 
 use crate::convert::arrays::{frozen, frozen_points, invalid, status, vectors};
 use crate::convert::interruptible;
-use crate::forward::model_choice::Choice;
 use crate::forward::one_row;
 use crate::forward::shape::Shape;
 use crate::robot::Robot;
@@ -45,7 +45,8 @@ pub(crate) fn _prebend<'py>(
     let answer = answer.map_err(|e| invalid(&e))?;
     let disks = answer.errors.len();
     let robot = Robot::from(answer.robot);
-    let shape = Shape::new(robot.clone(), Choice::Rod(settings.rod), pulls, answer.shape);
+    let solution = Solution { displacements: pulls, shape: answer.shape };
+    let shape = Shape::new(robot.clone(), ModelSettings::Rod(settings.rod), solution);
     let fields = [
         Bound::new(py, robot)?.into_any(),
         Bound::new(py, shape)?.into_any(),

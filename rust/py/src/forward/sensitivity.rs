@@ -10,7 +10,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
 use tdcr::InvalidInput;
-use tdcr::rod::{self as core, Linearized, Plan, Rod, Scratch};
+use tdcr::forward::{Forward, ModelSettings, Plan};
+use tdcr::rod::{self as core, Linearized, Rod};
 
 use crate::convert::arguments::number;
 use crate::convert::arrays::{
@@ -18,8 +19,7 @@ use crate::convert::arrays::{
 };
 use crate::convert::python_side;
 use crate::forward::jacobian::frozen_columns;
-use crate::forward::model_choice::Choice;
-use crate::forward::rod;
+use crate::forward::run;
 use crate::forward::shape::Shape;
 use crate::scene::Surroundings;
 
@@ -62,7 +62,7 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
         return Err(PyTypeError::new_err(message));
     };
     let own = shape.get();
-    let Choice::Rod(settings) = own.choice() else {
+    let ModelSettings::Rod(settings) = own.model_settings() else {
         let got = format!("one of model \"{}\"", own.model());
         return Err(invalid(&InvalidInput::new("shape", "a shape of model \"rod\"", got)));
     };
@@ -73,14 +73,9 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
     if !own.ok() {
         return Err(Shape::not_converged(shape));
     }
-    let plan = own.kept_robot().rod_plan(settings).map_err(|e| invalid(&e))?;
-    let at = rod::run(py, own.core_robot(), &plan, |rod| {
-        let mut work = Scratch::default();
-        // Nothing is left to do there, but for factors and equations.
-        rod.solve_from(own.state(), own.given(), &mut work)?;
-        Ok(rod.sensitivity(own.given(), &work).linearized())
-    })?;
-    let at = at.map_err(|e: InvalidInput| invalid(&e))?;
+    let plan = Plan::rod(own.core_robot(), settings).map_err(|e| invalid(&e))?;
+    let forward = Forward::new(own.core_robot(), own.model_settings()).map_err(|e| invalid(&e))?;
+    let at = run(py, forward, None, |forward| forward.linearize(own.state(), own.given()))?;
     Ok(Sensitivity { shape: shape.clone().unbind(), plan, at })
 }
 
@@ -93,7 +88,7 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
 #[pyclass(frozen, eq, module = "tdcr")]
 pub(crate) struct Sensitivity {
     shape: Py<Shape>,
-    plan: Arc<Plan>,
+    plan: Arc<core::Plan>,
     at: Arc<Linearized>,
 }
 

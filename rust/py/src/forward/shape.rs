@@ -6,12 +6,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple, PyType};
 
 use tdcr::Status;
+use tdcr::forward::{ModelSettings, Solution};
 use tdcr::lie::Pose;
 use tdcr::model::State;
 
 use crate::convert::arrays::{Lazy, frozen, frozen_frames, frozen_points, status};
 use crate::convert::python_side;
-use crate::forward::model_choice::Choice;
+use crate::forward::model_choice::python_settings;
 use crate::robot::Robot;
 use crate::scene::Surroundings;
 use crate::scene::contact::Contact;
@@ -23,7 +24,7 @@ use crate::scene::loads::Loads;
 #[pyclass(frozen, module = "tdcr")]
 pub(crate) struct Shape {
     robot: Robot,
-    choice: Choice,
+    settings: ModelSettings,
     displacements: Vec<f64>,
     core: tdcr::Shape,
     /// None where there is nothing.
@@ -46,11 +47,10 @@ struct Arrays {
 impl Shape {
     pub(crate) fn new(
         robot: Robot,
-        choice: Choice,
-        displacements: Vec<f64>,
-        core: tdcr::Shape,
+        settings: ModelSettings,
+        Solution { displacements, shape: core }: Solution,
     ) -> Self {
-        Self { robot, choice, displacements, core, around: None, arrays: Arrays::default() }
+        Self { robot, settings, displacements, core, around: None, arrays: Arrays::default() }
     }
 
     /// The same, solved among obstacles and under loads.
@@ -62,16 +62,12 @@ impl Shape {
         self.around.as_ref()
     }
 
-    pub(crate) const fn choice(&self) -> Choice {
-        self.choice
+    pub(crate) const fn model_settings(&self) -> ModelSettings {
+        self.settings
     }
 
     pub(crate) fn given(&self) -> &[f64] {
         &self.displacements
-    }
-
-    pub(crate) fn kept_robot(&self) -> &Robot {
-        &self.robot
     }
 
     /// The exception that has it as its result.
@@ -102,7 +98,7 @@ impl Shape {
     pub(crate) fn same(&self, other: &Self) -> bool {
         let (a, b) = (&self.core, &other.core);
         self.robot == other.robot
-            && self.choice == other.choice
+            && self.settings == other.settings
             && same_bits(&self.displacements, &other.displacements)
             && a.state.frames == b.state.frames
             && a.state.strains == b.state.strains
@@ -124,13 +120,13 @@ impl Shape {
     /// Name of the model that solved it.
     #[getter]
     pub(crate) fn model(&self) -> &'static str {
-        self.choice.model()
+        self.settings.model()
     }
 
     /// The settings it was solved with: RodSettings, LinkageSettings or ConstantCurvatureSettings.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.choice.settings(py)
+        python_settings(py, self.settings)
     }
 
     /// Tendon displacements, shape (K,) [m]: negative pulls, `inf` is free. Of a shape under given

@@ -5,11 +5,12 @@ use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
 use tdcr::Status;
+use tdcr::forward::Solution;
 use tdcr::lie::Pose;
 use tdcr::model::{Report, State};
 
 use crate::convert::arrays::{float_array, values, wrong_shape};
-use crate::forward::model_choice::Choice;
+use crate::forward::model_choice::model_settings;
 use crate::forward::shape::Shape;
 use crate::robot::Robot;
 use crate::scene::Surroundings;
@@ -64,11 +65,11 @@ pub(crate) fn _shape(
     let (name, message, residual, iterations) = outcome;
     let known = Status::ALL.into_iter().find(|status| status.as_str() == name);
     let status = known.unwrap_or(Status::NumericalError);
-    let core = tdcr::Shape { state, report: Report { status, residual, iterations }, message };
-    let choice = Choice::new(model, Some(settings))?;
+    let shape = tdcr::Shape { state, report: Report { status, residual, iterations }, message };
+    let settings = model_settings(model, Some(settings))?;
     let displacements = list("displacements", displacements)?;
-    fits(&robot.get().0, &core.state, &displacements)?;
-    Ok(Shape::new(robot.get().clone(), choice, displacements, core).among(around))
+    fits(&robot.get().0, &shape.state, &displacements)?;
+    Ok(Shape::new(robot.get().clone(), settings, Solution { displacements, shape }).among(around))
 }
 
 /// Refuses a state that is not one of the robot: its tendons' holes are looked up by disk.

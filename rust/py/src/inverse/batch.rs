@@ -15,7 +15,7 @@ use crate::convert::interruptible;
 use crate::inverse::targets::many_targets;
 use crate::inverse::{Engine, Plans, one_start};
 use crate::robot::Robot;
-use crate::scene::{Surroundings, checked};
+use crate::scene::{Surroundings, raise_fault};
 use crate::settings::inverse::InverseSettings;
 
 /// Columns of many inverses, each alone (`chain` false) or from the answer of the one before.
@@ -56,7 +56,7 @@ pub(crate) fn _inverse_batch<'py>(
         }
         Engine::Rod(inverse) => {
             let rows = invert_many(py, &**inverse, &targets, start, pool, progress, &around)?;
-            checked(py, inverse.take_fault())?;
+            raise_fault(py, inverse.take_fault())?;
             Ok(rows)
         }
     }

@@ -15,16 +15,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use tdcr::InvalidInput;
-use tdcr::model::{Model as _, State};
-use tdcr::obstacle::{Fault, FirstFault, Obstacle, SignedDistance, Volume};
+use tdcr::forward::{Forward, ModelSettings};
+use tdcr::obstacle::{Fault, Obstacle, SignedDistance, Volume};
 use tdcr::robot::Robot;
-use tdcr::rod::contact::{LoadedRod, Scene, Scratch};
-use tdcr::rod::{Plan, RodSettings};
+use tdcr::rod::Plan;
+use tdcr::rod::contact::Scene;
 
 use crate::convert::arguments::wrong_type;
 use crate::convert::arrays::invalid;
-use crate::convert::interruptible;
-use crate::forward::rod::Load;
 use crate::scene::loads::Loads;
 use crate::scene::obstacle::{obstacles, raised};
 
@@ -81,15 +79,36 @@ impl Surroundings {
         self.loads.as_ref().map(|_| "loads")
     }
 
-    /// The robot's scene.
-    pub(crate) fn scene(
-        &self,
-        robot: &Robot,
-        plan: &Plan,
-        settings: &RodSettings,
-    ) -> Result<Scene, InvalidInput> {
+    /// Presence of a function of the caller's among the obstacles.
+    pub(crate) fn calls_functions(&self) -> bool {
+        self.obstacles.iter().any(|o| matches!(o.volume(), Volume::SignedDistance(_)))
+    }
+
+    /// Refuses surroundings for a model that knows no forces.
+    pub(crate) fn check(&self, settings: &ModelSettings) -> PyResult<()> {
         let loads = self.loads.as_ref().map(|loads| &loads.0);
-        Scene::new(robot, plan, &self.obstacles, loads, settings.body_radius)
+        settings.check_surroundings(&self.obstacles, loads).map_err(|e| invalid(&e))
+    }
+
+    /// Robot prepared for a model in these surroundings.
+    pub(crate) fn prepare<'r>(
+        &self,
+        robot: &'r Robot,
+        settings: ModelSettings,
+    ) -> PyResult<Forward<'r>> {
+        let loads = self.loads.as_ref().map(|loads| &loads.0);
+        Forward::new(robot, settings)
+            .and_then(|forward| forward.among(&self.obstacles, loads))
+            .map_err(|e| invalid(&e))
+    }
+
+    /// Scene of the rod of a robot, if there is anything around it.
+    pub(crate) fn scene(&self, robot: &Robot, plan: &Plan) -> Result<Option<Scene>, InvalidInput> {
+        if self.any().is_none() {
+            return Ok(None);
+        }
+        let loads = self.loads.as_ref().map(|loads| &loads.0);
+        Scene::new(robot, plan, &self.obstacles, loads, plan.settings().body_radius).map(Some)
     }
 
     pub(crate) fn same(&self, other: &Self, py: Python<'_>) -> PyResult<bool> {
@@ -131,63 +150,11 @@ fn listening(obstacle: Obstacle, index: Option<usize>, stop: &Stop) -> Obstacle 
     Obstacle::new(function, obstacle.inside())
 }
 
-/// Displacements and the shape of a load, found from rest or from an earlier shape.
-pub(crate) fn solve_load(
-    rod: &LoadedRod<'_>,
-    load: Load,
-    start: Option<State>,
-) -> Result<(Vec<f64>, tdcr::Shape), InvalidInput> {
-    let mut work = Scratch::default();
-    let report = match (&load, start) {
-        (Load::Tensions(tensions), _) => rod.solve_tensions(tensions, &mut work)?,
-        (Load::Displacements(displacements), None) => {
-            let shape = rod.shape(displacements)?;
-            return Ok((displacements.clone(), shape));
-        }
-        (Load::Displacements(displacements), Some(start)) => {
-            rod.robot().check_displacements(displacements)?;
-            rod.solve_from(&start, displacements, &mut work)?
-        }
-    };
-    let message = rod.message(&[], &work);
-    let state = rod.take_state(work);
-    let displacements = match load {
-        Load::Displacements(displacements) => displacements,
-        Load::Tensions(_) => rod.displacements(&state),
-    };
-    Ok((displacements, tdcr::Shape { state, report, message }))
-}
-
 /// Raises the fault that work ended with, if it did.
-pub(crate) fn checked(py: Python<'_>, fault: Option<Fault>) -> PyResult<()> {
+pub(crate) fn raise_fault(py: Python<'_>, fault: Option<Fault>) -> PyResult<()> {
     let Some(fault) = fault else { return Ok(()) };
     Err(match fault.downcast::<Named>() {
         Ok(named) => raised(py, named.fault, Some(&format!("obstacles[{}]", named.obstacle))),
         Err(fault) => raised(py, fault, None),
     })
-}
-
-/// Rods with more second derivatives than this may take longer than a second among meshes.
-const LONG: usize = 400;
-
-/// Solves once without the GIL, where Ctrl-C can stop it, if that may take long; but for the GIL that Python functions of obstacles take; these see Ctrl-C too.
-pub(crate) fn solve<T: Send>(
-    py: Python<'_>,
-    robot: &Robot,
-    plan: &Plan,
-    scene: &Scene,
-    job: impl FnOnce(&LoadedRod<'_>) -> Result<T, InvalidInput> + Send,
-) -> PyResult<T> {
-    let rod = LoadedRod::new(robot, plan, scene).map_err(|e| invalid(&e))?;
-    let mut first_fault = FirstFault::default();
-    let shape = if scene.calls_functions() || plan.second_derivatives() < LONG {
-        py.detach(|| job(&rod.reporting_to(&first_fault)))
-    } else {
-        interruptible::run(py, None, |control| {
-            first_fault = FirstFault::raising(Arc::clone(&control.stop));
-            job(&rod.reporting_to(&first_fault))
-        })?
-    };
-    checked(py, first_fault.take())?;
-    shape.map_err(|e| invalid(&e))
 }

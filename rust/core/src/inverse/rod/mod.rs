@@ -31,7 +31,6 @@ use crate::rod::equilibrium::{ContactRod, Equilibrium};
 use crate::rod::{self, Plan, Rod};
 use crate::solve::convex_region::Region;
 use crate::status::Status;
-pub use disk_positions::PositionsAnswer;
 use from_rest::FromRest;
 
 /// Buffers of a solve and the tensions it found.

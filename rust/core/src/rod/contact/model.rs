@@ -110,57 +110,6 @@ impl<'r> LoadedRod<'r> {
         DETECTION * self.shortest
     }
 
-    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
-    /// elements, under the whole loads from the first step on; a start that does not help is dropped.
-    ///
-    /// # Errors
-    /// `InvalidInput` for a start with another number of strains.
-    pub fn solve_from(
-        &self,
-        start: &State,
-        displacements: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        let plan = self.plan();
-        self.set_rest(work);
-        let Minimizer { current, estimates, .. } = &mut work.minimizer;
-        read_state(start, plan, &mut current.strains, &mut estimates.tensions)?;
-        let own = estimates.tensions.iter().zip(&plan.compliance);
-        let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, c))| l - t * c);
-        work.checkpoint.target = Some(TendonTarget::Lengths(from.collect()));
-        // A fault comes again, and is reported, where the shape is evaluated.
-        if self.measure_penetration(work).is_err() {
-            work.initial_penetration = None;
-        }
-        work.ending = Ending::Converged;
-        self.recall_contacts(start, work);
-        self.resume(displacements, work)
-    }
-
-    /// Displacements under which a shape has the lengths and tensions that it has; see [`Rod::displacements`].
-    #[must_use]
-    pub fn displacements(&self, state: &State) -> Vec<f64> {
-        self.rod.displacements(state)
-    }
-
-    /// Solves for tensions, in the unit of the results: displacements are then those of the shape
-    /// ([`Self::displacements`]). Tensions, loads and contacts grow together from rest.
-    ///
-    /// # Errors
-    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
-    pub fn solve_tensions(
-        &self,
-        tensions: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        self.plan().check_tensions(tensions)?;
-        let tensions = tensions.iter().map(|tension| tension / self.plan().unit).collect();
-        let target = TendonTarget::Tensions(tensions);
-        let report = self.solve_from_rest(&target, work, self.rod.stop.as_deref());
-        self.report_fault(work);
-        Ok(report)
-    }
-
     /// Solves as [`Model::solve`], but ends soon after another flag is set.
     pub(crate) fn solve_until(
         &self,
@@ -303,6 +252,8 @@ impl<'r> LoadedRod<'r> {
 }
 
 impl Model for LoadedRod<'_> {
+    const NAME: &'static str = Rod::NAME;
+
     type Scratch = Scratch;
 
     fn robot(&self) -> &Robot {
@@ -338,6 +289,52 @@ impl Model for LoadedRod<'_> {
             return Ok(report);
         }
         self.solve(displacements, work)
+    }
+
+    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
+    /// elements, under the whole loads from the first step on; a start that does not help is dropped.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a start with another number of strains.
+    fn solve_from(
+        &self,
+        start: &State,
+        displacements: &[f64],
+        work: &mut Scratch,
+    ) -> Result<Report, InvalidInput> {
+        let plan = self.plan();
+        self.set_rest(work);
+        let Minimizer { current, estimates, .. } = &mut work.minimizer;
+        read_state(start, plan, &mut current.strains, &mut estimates.tensions)?;
+        let own = estimates.tensions.iter().zip(&plan.compliance);
+        let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, c))| l - t * c);
+        work.checkpoint.target = Some(TendonTarget::Lengths(from.collect()));
+        // A fault comes again, and is reported, where the shape is evaluated.
+        if self.measure_penetration(work).is_err() {
+            work.initial_penetration = None;
+        }
+        work.ending = Ending::Converged;
+        self.recall_contacts(start, work);
+        self.resume(displacements, work)
+    }
+
+    /// Displacements under which a shape has the lengths and tensions that it has; see [`Rod::displacements`].
+    fn displacements(&self, state: &State) -> Vec<f64> {
+        self.rod.displacements(state)
+    }
+
+    /// Solves for tensions, in the unit of the results: displacements are then those of the shape
+    /// ([`Self::displacements`]). Tensions, loads and contacts grow together from rest.
+    ///
+    /// # Errors
+    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
+    fn solve_tensions(&self, tensions: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
+        self.plan().check_tensions(tensions)?;
+        let tensions = tensions.iter().map(|tension| tension / self.plan().unit).collect();
+        let target = TendonTarget::Tensions(tensions);
+        let report = self.solve_from_rest(&target, work, self.rod.stop.as_deref());
+        self.report_fault(work);
+        Ok(report)
     }
 
     fn state<'w>(&self, work: &'w Scratch) -> &'w State {
