@@ -22,7 +22,7 @@ fn trunk(rest: Option<Vec<V>>, base: &Pose) -> Robot {
 fn ball(x: f64, y: f64, base: &Pose) -> Case {
     let mut case = Case::new(trunk(None, base));
     let sphere = Obstacle::new(Sphere::new(&V::new(x, y, 0.13), 0.02).unwrap(), false);
-    case.obstacles.push(sphere.transformed(base));
+    case.obstacles.push(sphere.transform(base));
     case
 }
 

@@ -11,13 +11,12 @@ import numpy as np
 
 from tdcr._base.status import Status
 from tdcr._core import Robot
-from tdcr._io.plain_data import made
+from tdcr._io.plain_data import OBSTACLES, made
 from tdcr.errors import InvalidInput
 
 __all__ = ["Record"]
 
 _SETTINGS = ("RodSettings", "LinkageSettings", "ConstantCurvatureSettings")
-_OBSTACLES = ("Sphere", "Cylinder", "HalfSpace", "Capsule", "Box", "Mesh")
 _WORDS = {None: np.nan, "inf": np.inf, "-inf": -np.inf}
 _KINDS = {"f": "numbers", "i": "whole numbers", "u": "whole numbers", "b": "true or false"}
 
@@ -102,7 +101,7 @@ class Record:
         with self.at(name):
             return made(value, kinds)
 
-    def things(self, name: str, kinds: tuple[str, ...] = _OBSTACLES) -> tuple[Any, ...]:
+    def things(self, name: str, kinds: tuple[str, ...] = tuple(OBSTACLES)) -> tuple[Any, ...]:
         value = self.get(name)
         if not isinstance(value, list):
             raise self.fault(name, f"expected a list, got {value!r}")

@@ -11,26 +11,24 @@ from tdcr._base.status import Status
 from tdcr._core import Contact, Robot, SignedDistance
 from tdcr.errors import InvalidInput
 
-__all__ = ["described", "made"]
+__all__ = ["OBSTACLES", "described", "made"]
+
+# Obstacles that are data, with the positional arguments of their constructors.
+OBSTACLES = _core._obstacle_arguments
 
 # What files may name, with the positional arguments of the constructors.
 _ARGUMENTS = {
     "Bounds": (),
-    "Box": ("center", "half_extents", "rotation"),
-    "Capsule": ("a", "b", "radius"),
     "ConstantCurvatureSettings": (),
     "Contact": (
         "disk", "kind", "tendon", "obstacle", "point", "normal", "gap", "force",
     ),
-    "Cylinder": ("point", "axis", "radius"),
-    "HalfSpace": ("point", "normal"),
     "InverseSettings": (),
     "LinkageSettings": (),
     "Loads": (),
-    "Mesh": ("vertices", "faces"),
     "PsoSettings": (),
     "RodSettings": (),
-    "Sphere": ("center", "radius"),
+    **OBSTACLES,
 }  # fmt: skip
 _INFINITE = {"inf": np.inf, "-inf": -np.inf}
 

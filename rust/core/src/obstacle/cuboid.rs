@@ -4,7 +4,7 @@ use std::hash::Hasher;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Fault, Near, Solid, moved, tightest_first, within};
+use super::{Fault, Near, Solid, move_pose, tightest_first, within};
 use crate::error::{self, InvalidInput, finite_vector, length};
 use crate::hashing::Bits;
 use crate::lie::Pose;
@@ -105,18 +105,18 @@ impl Cuboid {
         if clear < 2 || from.norm() < super::KINK {
             return self.face(&x, nearest, sign);
         }
-        Near::round(&from, &across, 0.0, from).rotated(&self.pose.rotation).of(code(side))
+        Near::round(&from, &across, 0.0, from).rotate(&self.pose.rotation).of(code(side))
     }
 
     /// Every face of the lumen within reach, or the nearest: the inside is their intersection.
     fn lumen(&self, x: &Vector3<f64>, reach: f64, out: &mut Vec<Near>) {
-        let nearest = self.nearest(x).flipped(true);
+        let nearest = self.nearest(x).flip_if(true);
         let within = within(nearest.distance, reach);
         let x = self.local(x);
         let start = out.len();
         for axis in 0..3 {
             for sign in [1.0, -1.0] {
-                let face = self.face(&x, axis, sign).flipped(true);
+                let face = self.face(&x, axis, sign).flip_if(true);
                 if face.distance <= within {
                     out.push(face);
                 }
@@ -130,8 +130,8 @@ impl Cuboid {
 }
 
 impl Solid for Cuboid {
-    fn transformed(&self, pose: &Pose) -> Self {
-        Self { pose: moved(pose, &self.pose), ..*self }
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { pose: move_pose(pose, &self.pose), ..*self }
     }
 
     fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {

@@ -72,7 +72,7 @@ impl Near {
     }
 
     /// Condition seen from the other side.
-    fn flipped(self, flip: bool) -> Self {
+    fn flip_if(self, flip: bool) -> Self {
         if !flip {
             return self;
         }
@@ -80,7 +80,7 @@ impl Near {
         Self { distance: -self.distance, gradient, hessian, feature: self.feature }
     }
 
-    fn rotated(self, rotation: &Matrix3<f64>) -> Self {
+    fn rotate(self, rotation: &Matrix3<f64>) -> Self {
         let gradient = rotation * self.gradient;
         Self { gradient, hessian: rotation * self.hessian * rotation.transpose(), ..self }
     }
@@ -94,7 +94,7 @@ impl Near {
 /// Solid of an obstacle. A new one is a file that implements this, and a line in the list of [`Volume`].
 trait Solid: Sized {
     /// Solid moved with its frame.
-    fn transformed(&self, pose: &Pose) -> Self;
+    fn transform(&self, pose: &Pose) -> Self;
 
     /// Signed distance of a point, positive outside, with its derivatives.
     fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault>;
@@ -107,7 +107,7 @@ trait Solid: Sized {
         inside: bool,
         out: &mut Vec<Near>,
     ) -> Result<(), Fault> {
-        out.push(self.near(x)?.flipped(inside));
+        out.push(self.near(x)?.flip_if(inside));
         Ok(())
     }
 
@@ -142,9 +142,9 @@ macro_rules! volume {
         })*
 
         impl Solid for Volume {
-            fn transformed(&self, pose: &Pose) -> Self {
+            fn transform(&self, pose: &Pose) -> Self {
                 match self {
-                    $(Self::$name(v) => v.transformed(pose).into(),)*
+                    $(Self::$name(v) => v.transform(pose).into(),)*
                 }
             }
 
@@ -231,8 +231,8 @@ impl Obstacle {
 
     /// Obstacle moved with its frame: given in the frame `pose`, seen from outside that frame.
     #[must_use]
-    pub fn transformed(&self, pose: &Pose) -> Self {
-        Self { volume: self.volume.transformed(pose), inside: self.inside }
+    pub fn transform(&self, pose: &Pose) -> Self {
+        Self { volume: self.volume.transform(pose), inside: self.inside }
     }
 
     /// The signed distance of a point \[m\] with its derivatives.
@@ -243,7 +243,7 @@ impl Obstacle {
     /// # Errors
     /// A [`SignedDistance`] that failed; no other volume can.
     pub fn nearest(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
-        Ok(self.volume.near(x)?.flipped(self.inside))
+        Ok(self.volume.near(x)?.flip_if(self.inside))
     }
 
     /// Appends the conditions that together say, near `x`, that a point is where it may be: all that a
@@ -284,19 +284,19 @@ fn tightest_first(entries: &mut [Near]) {
 }
 
 /// A rigid motion without negative zeros, so that equal obstacles have equal bits.
-fn moved(pose: &Pose, inner: &Pose) -> Pose {
+fn move_pose(pose: &Pose, inner: &Pose) -> Pose {
     let pose = pose.compose(inner);
     let (rotation, translation) =
         (pose.rotation.map(|e| e + 0.0), pose.translation.map(|e| e + 0.0));
     Pose { rotation, translation }
 }
 
-/// A place moved, without negative zeros.
-fn moved_point(pose: &Pose, point: &Vector3<f64>) -> Vector3<f64> {
+/// A place moved by a pose, without negative zeros.
+fn move_point(pose: &Pose, point: &Vector3<f64>) -> Vector3<f64> {
     pose.transform(point).map(|e| e + 0.0)
 }
 
-/// A direction turned, without negative zeros.
-fn turned(pose: &Pose, direction: &Vector3<f64>) -> Vector3<f64> {
+/// A direction turned by a pose, without negative zeros.
+fn turn_direction(pose: &Pose, direction: &Vector3<f64>) -> Vector3<f64> {
     (pose.rotation * direction).map(|e| e + 0.0)
 }

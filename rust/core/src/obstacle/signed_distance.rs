@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Near, Solid, moved};
+use super::{Near, Solid, move_pose};
 use crate::error::InvalidInput;
 use crate::hashing::Bits;
 use crate::lie::Pose;
@@ -121,9 +121,9 @@ impl SignedDistance {
         self.pose.rotation.tr_mul(&(x - self.pose.translation))
     }
 
-    /// Signed distance with its Hessian, within reach of the surface: central differences of the gradient, whose step of
+    /// Signed distance with its Hessian within reach of the surface: central differences of the gradient, whose step of
     /// ε^(1/4) suits gradients that are differences themselves.
-    fn curved(&self, x: &Vector3<f64>, reach: f64) -> Result<Near, Fault> {
+    fn near_with_hessian(&self, x: &Vector3<f64>, reach: f64) -> Result<Near, Fault> {
         let x = self.local(x);
         let mut near = self.evaluate(&x)?;
         if near.distance.abs() <= reach {
@@ -136,17 +136,17 @@ impl SignedDistance {
             }
             near.hessian = (columns + columns.transpose()) / 2.0;
         }
-        Ok(near.rotated(&self.pose.rotation))
+        Ok(near.rotate(&self.pose.rotation))
     }
 }
 
 impl Solid for SignedDistance {
-    fn transformed(&self, pose: &Pose) -> Self {
-        Self { function: self.function.clone(), pose: moved(pose, &self.pose) }
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { function: self.function.clone(), pose: move_pose(pose, &self.pose) }
     }
 
     fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
-        Ok(self.evaluate(&self.local(x))?.rotated(&self.pose.rotation))
+        Ok(self.evaluate(&self.local(x))?.rotate(&self.pose.rotation))
     }
 
     fn constraints(
@@ -156,7 +156,7 @@ impl Solid for SignedDistance {
         inside: bool,
         out: &mut Vec<Near>,
     ) -> Result<(), Fault> {
-        out.push(self.curved(x, reach)?.flipped(inside));
+        out.push(self.near_with_hessian(x, reach)?.flip_if(inside));
         Ok(())
     }
 

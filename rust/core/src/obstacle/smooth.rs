@@ -4,7 +4,7 @@ use std::hash::Hasher;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Fault, Near, Solid, moved_point, turned};
+use super::{Fault, Near, Solid, move_point, turn_direction};
 use crate::error::{InvalidInput, direction, finite_vector, length};
 use crate::hashing::Bits;
 use crate::lie::Pose;
@@ -51,8 +51,8 @@ impl Sphere {
 }
 
 impl Solid for Sphere {
-    fn transformed(&self, pose: &Pose) -> Self {
-        Self { center: moved_point(pose, &self.center), ..*self }
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { center: move_point(pose, &self.center), ..*self }
     }
 
     /// At the centre the gradient is the world's x axis.
@@ -120,8 +120,8 @@ impl Cylinder {
 }
 
 impl Solid for Cylinder {
-    fn transformed(&self, pose: &Pose) -> Self {
-        let (point, axis) = (moved_point(pose, &self.point), turned(pose, &self.axis));
+    fn transform(&self, pose: &Pose) -> Self {
+        let (point, axis) = (move_point(pose, &self.point), turn_direction(pose, &self.axis));
         Self { point, axis, ..*self }
     }
 
@@ -178,8 +178,8 @@ impl HalfSpace {
 }
 
 impl Solid for HalfSpace {
-    fn transformed(&self, pose: &Pose) -> Self {
-        Self { point: moved_point(pose, &self.point), normal: turned(pose, &self.normal) }
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { point: move_point(pose, &self.point), normal: turn_direction(pose, &self.normal) }
     }
 
     fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
@@ -244,8 +244,8 @@ impl Capsule {
 }
 
 impl Solid for Capsule {
-    fn transformed(&self, pose: &Pose) -> Self {
-        Self { a: moved_point(pose, &self.a), b: moved_point(pose, &self.b), ..*self }
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { a: move_point(pose, &self.a), b: move_point(pose, &self.b), ..*self }
     }
 
     /// On the segment the gradient is as on a cylinder's axis; of a single point, as in a sphere's centre.

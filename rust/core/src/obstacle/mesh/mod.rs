@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::{Fault, Near, Solid, moved, tightest_first};
+use super::{Fault, Near, Solid, move_pose, tightest_first};
 use crate::error::InvalidInput;
 use crate::hashing::Bits;
 use crate::lie::Pose;
@@ -69,8 +69,8 @@ impl Mesh {
 }
 
 impl Solid for Mesh {
-    fn transformed(&self, pose: &Pose) -> Self {
-        Self { surface: self.surface.clone(), pose: moved(pose, &self.pose) }
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { surface: self.surface.clone(), pose: move_pose(pose, &self.pose) }
     }
 
     fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
@@ -83,7 +83,7 @@ impl Solid for Mesh {
     }
 
     fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
-        Ok(self.surface.near(&self.local(x)).rotated(&self.pose.rotation))
+        Ok(self.surface.near(&self.local(x)).rotate(&self.pose.rotation))
     }
 
     fn constraints(
@@ -96,7 +96,7 @@ impl Solid for Mesh {
         let start = out.len();
         self.surface.constraints(&self.local(x), reach, inside, out);
         for entry in &mut out[start..] {
-            *entry = entry.rotated(&self.pose.rotation);
+            *entry = entry.rotate(&self.pose.rotation);
         }
         tightest_first(&mut out[start..]);
         Ok(())

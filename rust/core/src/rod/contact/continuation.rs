@@ -74,6 +74,7 @@ impl LoadedRod<'_> {
         let is_free = self.scene().obstacles.is_empty();
         let mut step = if is_free || from.is_some() { 1.0 } else { FIRST_STEP };
         (work.load, work.saddles_left) = (0.0, 0);
+        // Where to go back to if the first step fails.
         work.checkpoint.save(&work.minimizer);
         while work.load < 1.0 {
             // The minimum of M at the next load, in a part of the budget.
@@ -112,6 +113,7 @@ impl LoadedRod<'_> {
             // Not reached: back to the last load, and a shorter step from there.
             work.checkpoint.restore(&mut work.minimizer);
             self.reset_compliance(work);
+            // A quarter, so that a short step is found soon.
             step *= 0.25;
             if step < SHORTEST_STEP || *budget == 0 {
                 // The end: residuals are those of the last load's shape under the next one.

@@ -231,6 +231,7 @@ impl Lagrangian {
         for (disk, points) in scene.points.iter().enumerate() {
             let (frame, c) = (&self.frames[disk], estimates.contact_compliance[disk]);
             for (p, point) in points.iter().enumerate() {
+                // x, and its clearance from all obstacles.
                 let position = frame.transform(&point.position);
                 let mut clearance = Clearance::new(position);
                 for (o, obstacle) in scene.obstacles.iter().enumerate() {
@@ -249,6 +250,7 @@ impl Lagrangian {
                         let own = earlier.iter().find(|own| is_ridge || own.key == key);
                         let trial_force = own.map_or(0.0, |own| own.force) - gap / c;
                         let force = trial_force.max(0.0);
+                        // Conditions that push, or may push at the end of a step.
                         if force > 0.0 || gap < detection {
                             self.constraints.push(ActiveConstraint {
                                 key,
@@ -260,6 +262,7 @@ impl Lagrangian {
                                 trial_force,
                             });
                         }
+                        // ½ c λ².
                         let term = 0.5 * c * force * force;
                         self.value += term;
                         self.magnitude += term;

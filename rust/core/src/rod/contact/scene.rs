@@ -59,7 +59,7 @@ pub struct Scene {
     /// Force on every disk's centre and moment on the tip, base frame's axes, in the plan's unit.
     pub(super) forces: Vec<Vector3<f64>>,
     pub(in crate::rod) moment: Vector3<f64>,
-    /// Whether the moment or any force is not zero.
+    /// Presence of a moment or a force that is not zero.
     pub(super) has_loads: bool,
 }
 
@@ -94,7 +94,7 @@ impl Scene {
         }
         let has_loads = moment != Vector3::zeros() || forces.iter().any(|f| *f != Vector3::zeros());
         Ok(Self {
-            obstacles: obstacles.iter().map(|obstacle| obstacle.transformed(&base)).collect(),
+            obstacles: obstacles.iter().map(|obstacle| obstacle.transform(&base)).collect(),
             points: points.collect(),
             forces,
             moment,

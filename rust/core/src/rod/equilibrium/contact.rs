@@ -52,7 +52,7 @@ pub(crate) struct ContactRod<'r> {
     points: [Point; POINTS],
     at: usize,
     kept: [Point; 3],
-    /// Whether the minimiser's shape is that of the point at hand.
+    /// True while the minimiser's shape is that of the point at hand.
     is_current: bool,
     /// The Newton step that is left at the point at hand: displacements of the disks, twists about the base's origin,
     /// and changes of the tendons' lengths.

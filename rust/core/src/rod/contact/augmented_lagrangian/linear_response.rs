@@ -19,6 +19,7 @@ impl Minimizer {
         moment: &Vector3<f64>,
         tendon: usize,
     ) -> &[Vector6<f64>] {
+        // Contacts that push, and the changes of their forces, of which nothing is known at first.
         let pushing: Vec<usize> =
             (0..self.current.constraints.len()).filter(|k| self.active[*k]).collect();
         let mut forces = vec![0.0; pushing.len()];

@@ -3,6 +3,7 @@
 
 mod line_search;
 mod linear_response;
+mod saddle;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -13,7 +14,6 @@ use super::scene::Scene;
 use crate::obstacle::Fault;
 use crate::rod::dual_newton::Ending;
 use crate::rod::plan::Plan;
-use crate::solve::dense::dot;
 
 /// Steps below the rounding of M that may pass without the moment halving.
 const MOST_UNRESOLVED: usize = 4;
@@ -34,15 +34,10 @@ const MOST_SETS: usize = 8;
 const LEAST_SHIFT: f64 = 1e-5;
 const LARGEST_SHIFT: f64 = 1e2;
 const SHIFT_FACTOR: f64 = 8.0;
-/// Step off a saddle \[rad, all subsegments together\], and how often.
-const SADDLE_STEP: f64 = 1e-1;
+/// Saddles that are left at most.
 const MOST_SADDLES: usize = 6;
-/// Halvings of a step off a saddle that would lead through an obstacle.
-const SADDLE_HALVINGS: usize = 10;
-/// Steps in a row on which a shape may be unstable before it is taken for a saddle, if its gradient does not lead out
-/// \[rad\].
+/// Steps in a row on which a shape may be unstable before it is taken for a saddle, if its gradient does not lead out.
 const MOST_UNSTABLE: usize = 3;
-const SYMMETRIC: f64 = 1e-9;
 
 /// Problem of one load step: M is minimised for it.
 pub(super) struct Problem<'a> {
@@ -54,7 +49,7 @@ pub(super) struct Problem<'a> {
     pub(super) detection: f64,
     /// Depth in an obstacle that a point may pass through in one step \[m\].
     pub(super) allowed_slip: f64,
-    /// Whether no point may come to an obstacle's other side: not where the robot rests in one.
+    /// Ban on an obstacle's other side, for all points: not where the robot rests in one.
     pub(super) keeps_side: bool,
     pub(super) stop: Option<&'a AtomicBool>,
 }
@@ -68,7 +63,7 @@ pub(super) struct Residuals {
     pub(super) length: f64,
     /// Saddles left on the way.
     pub(super) saddles_left: usize,
-    /// Whether multipliers grew without an end.
+    /// True if multipliers grew without an end.
     pub(super) locked: bool,
 }
 
@@ -166,6 +161,7 @@ impl Minimizer {
                     self.estimates.scale_compliance(STIFFENING);
                     self.evaluate_current(problem)?;
                 } else if residuals.saddles_left < MOST_SADDLES {
+                    // Stiff already: off along the least curvature, and from there as at first.
                     self.leave_saddle(problem)?;
                     residuals.saddles_left += 1;
                     update_limit = first_limit;
@@ -174,6 +170,7 @@ impl Minimizer {
                 }
                 continue;
             }
+            // Out of steps, or stopped.
             if *budget == 0 {
                 return Ok((Ending::Spent, residuals));
             }
@@ -306,9 +303,9 @@ impl Minimizer {
         self.riccati.write_length_changes(problem.plan, &mut self.length_changes);
         for (k, pulling) in self.pulling.iter_mut().enumerate() {
             let more = self.length_changes[k] / self.compliance[k];
-            let pulls = self.bounded[k] && self.current.trial_tensions[k] + more > 0.0;
-            changes |= pulls != *pulling;
-            *pulling = pulls;
+            let is_tight = self.bounded[k] && self.current.trial_tensions[k] + more > 0.0;
+            changes |= is_tight != *pulling;
+            *pulling = is_tight;
         }
         changes
     }
@@ -369,38 +366,5 @@ impl Minimizer {
         if self.estimates.stiffness > 1.0 {
             self.estimates.scale_compliance(1.0 / STIFFENING);
         }
-    }
-
-    /// Symmetry of an unstable shape: its gradient has no part along the way out, so it stays unstable on the way down.
-    fn is_symmetric(&self, plan: &Plan) -> bool {
-        let (width, data) = (plan.width(), &plan.data);
-        let mut size = 0.0;
-        for (k, escape) in self.escape.iter().enumerate() {
-            let elasticity = &data[k / width].elasticity;
-            size += escape * escape * elasticity.stiffness(k % width % plan.unknowns());
-        }
-        dot(&self.gradient, &self.escape).abs() <= SYMMETRIC * size
-    }
-
-    /// Leaves a saddle along the direction of negative curvature, as far as no point goes through an obstacle, under
-    /// the compliances of the start.
-    fn leave_saddle(&mut self, problem: &Problem<'_>) -> Result<(), Fault> {
-        self.unstable_steps = 0;
-        self.estimates.scale_compliance(self.estimates.stiffness);
-        self.evaluate_current(problem)?;
-        let sum: f64 = self.escape.iter().map(|escape| escape.abs()).sum();
-        let mut size = SADDLE_STEP / sum;
-        for _ in 0..SADDLE_HALVINGS {
-            self.trial.strains.clear();
-            let ends = self.current.strains.iter().zip(&self.escape);
-            self.trial.strains.extend(ends.map(|(own, escape)| own + size * escape));
-            self.evaluate_trial(problem)?;
-            if self.is_free_path(problem)? {
-                break;
-            }
-            size *= 0.5;
-        }
-        std::mem::swap(&mut self.current, &mut self.trial);
-        Ok(())
     }
 }

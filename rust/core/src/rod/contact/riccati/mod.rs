@@ -156,6 +156,7 @@ impl Riccati {
                 }
                 q[a * (width + 1)] += at.shift * plan.data[i].elasticity.stiffness(a % D);
             }
+            // L, and the first block that is not positive definite.
             self.factor_block(i, width, plan.data[i].elasticity.bending());
             // L⁻¹ Nᵀ, by rows.
             let l = &self.factors[i * width * width..(i + 1) * width * width];
