@@ -78,7 +78,6 @@ __all__ = [
 ]
 
 __version__: str
-_obstacle_arguments: dict[str, tuple[str, ...]]
 
 _Floats: TypeAlias = float | Sequence[float] | NDArray[np.float64]
 _Array: TypeAlias = NDArray[np.float64]

@@ -3,9 +3,8 @@
 use std::fmt::Write as _;
 
 use nalgebra::{Matrix3, Vector3};
-use pyo3::PyClass;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyModule, PyTuple};
+use pyo3::types::{PyDict, PyTuple};
 
 use tdcr::obstacle as core;
 
@@ -14,26 +13,14 @@ use crate::convert::arrays::{frozen, frozen_vector, invalid, matrix3, vector};
 use crate::scene::mesh::Mesh;
 use crate::scene::obstacle::Obstacle;
 
-/// Adds the classes of obstacles that are data, and the positional arguments of their constructors by name: a new one
-/// is a class and a line here.
+/// Adds the classes of obstacles that are data: a new one is a class and a line here.
 pub(crate) fn add_shapes(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    let arguments = PyDict::new(module.py());
-    add_shape::<Sphere>(module, &arguments, &["center", "radius"])?;
-    add_shape::<Cylinder>(module, &arguments, &["point", "axis", "radius"])?;
-    add_shape::<HalfSpace>(module, &arguments, &["point", "normal"])?;
-    add_shape::<Capsule>(module, &arguments, &["a", "b", "radius"])?;
-    add_shape::<Cuboid>(module, &arguments, &["center", "half_extents", "rotation"])?;
-    add_shape::<Mesh>(module, &arguments, &["vertices", "faces"])?;
-    module.add("_obstacle_arguments", arguments)
-}
-
-fn add_shape<T: PyClass>(
-    module: &Bound<'_, PyModule>,
-    arguments: &Bound<'_, PyDict>,
-    names: &[&str],
-) -> PyResult<()> {
-    module.add_class::<T>()?;
-    arguments.set_item(T::NAME, PyTuple::new(module.py(), names)?)
+    module.add_class::<Sphere>()?;
+    module.add_class::<Cylinder>()?;
+    module.add_class::<HalfSpace>()?;
+    module.add_class::<Capsule>()?;
+    module.add_class::<Cuboid>()?;
+    module.add_class::<Mesh>()
 }
 
 type NewArgs<'py> = (Bound<'py, PyTuple>, Bound<'py, PyDict>);
