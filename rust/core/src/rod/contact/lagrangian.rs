@@ -46,7 +46,7 @@ impl ActiveConstraint {
 /// Shape with the value of its augmented Lagrangian, and all that this is made of.
 #[derive(Clone, Debug, Default)]
 pub(in crate::rod) struct Lagrangian {
-    pub(super) strains: Vec<f64>,
+    pub(in crate::rod) strains: Vec<f64>,
     /// Frame of every disk in the base's, and of every subsegment's end in its base disk's.
     pub(in crate::rod) frames: Vec<Pose>,
     pub(super) ends: Vec<Pose>,
