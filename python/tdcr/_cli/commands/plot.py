@@ -80,7 +80,7 @@ def plot(
     workspaces, designs, fits and grasps (.npz, .json, of workspaces .parquet).
     """
     if output is None and animate is None:
-        raise click.UsageError("expected --output options.FILE, --animate options.FILE or both")
+        raise click.UsageError("expected --output FILE, --animate FILE or both")
     out.check_picture(output)
     # A robot or a result, and options that suit it.
     thing = _read(file)
@@ -124,7 +124,7 @@ def _check_options(context: click.Context, thing: Any) -> None:
     if "unit" in given and context.params["displacements"] is None:
         raise click.UsageError("--unit: expected --pull too")
     if "frames" in given and context.params["animate"] is None:
-        raise click.UsageError("--frames: expected --animate options.FILE too")
+        raise click.UsageError("--frames: expected --animate FILE too")
 
 
 def _read(file: Path) -> Any:

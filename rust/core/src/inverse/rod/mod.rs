@@ -185,7 +185,7 @@ impl<'a> RodInverse<'a> {
         }
     }
 
-    fn from_rest<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Option<FromRest<'w>> {
+    fn rest_solves<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Option<FromRest<'w>> {
         self.loaded.as_ref().map(|rod| FromRest::new(rod, self.robot, stop))
     }
 
@@ -322,7 +322,7 @@ impl Inverter for RodInverse<'_> {
             bends: Vec::new(),
             met: false,
             before: None,
-            from_rest: self.from_rest(stop),
+            from_rest: self.rest_solves(stop),
         }
     }
 

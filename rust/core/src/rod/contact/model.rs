@@ -25,6 +25,32 @@ const TOUCHING: f64 = 1e-9;
 const DETECTION: f64 = 0.5;
 
 /// Buffers of a solve.
+///
+/// ```
+/// use tdcr::rod::contact::Scratch;
+/// # use nalgebra::Vector3;
+/// # use tdcr::model::Model;
+/// # use tdcr::obstacle::{HalfSpace, Obstacle};
+/// # use tdcr::rod::contact::{LoadedRod, Scene};
+/// # use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// // A wall 30 mm beside the robot.
+/// let wall = HalfSpace::new(&Vector3::new(0.03, 0.0, 0.0), &-Vector3::x())?;
+/// let scene = Scene::new(&robot, &plan, &[Obstacle::new(wall, false)], None, 0.0)?;
+/// let rod = LoadedRod::new(&robot, &plan, &scene)?;
+/// let mut scratch = Scratch::default();
+/// rod.solve(&[-0.002, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+/// // No obstacle's function failed.
+/// assert!(scratch.take_fault().is_none());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Default)]
 pub struct Scratch {
     state: State,
@@ -52,6 +78,31 @@ impl Scratch {
 }
 
 /// A rod in its surroundings, ready to solve.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::model::Model;
+/// # use tdcr::obstacle::{HalfSpace, Obstacle};
+/// # use tdcr::rod::contact::{LoadedRod, Scene};
+/// # use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// // A wall 30 mm beside the robot.
+/// let wall = HalfSpace::new(&Vector3::new(0.03, 0.0, 0.0), &-Vector3::x())?;
+/// let scene = Scene::new(&robot, &plan, &[Obstacle::new(wall, false)], None, 0.0)?;
+/// let rod = LoadedRod::new(&robot, &plan, &scene)?;
+/// let shape = rod.shape(&[-0.01, f64::INFINITY, f64::INFINITY])?;
+/// assert_eq!(shape.report.status, tdcr::Status::Converged);
+/// // It leans on the wall.
+/// assert!(shape.state.contacts.iter().any(|contact| contact.force.x < 0.0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct LoadedRod<'r> {
     rod: Rod<'r>,
