@@ -120,9 +120,12 @@ const CASES: [Case; 5] = [
 
 fn main() {
     let given: Vec<String> = args().skip(1).collect();
-    let case = CASES.iter().find(|(name, _)| given.first().is_some_and(|first| first == name));
-    match case {
-        Some((_, run)) => run(given[1].parse().unwrap()),
-        None => CASES.iter().for_each(|(_, run)| run(1)),
+    if let [case, times] = given.as_slice() {
+        let (_, run) = CASES.iter().find(|(name, _)| name == case).unwrap();
+        run(times.parse().unwrap());
+    } else {
+        for (_, run) in CASES {
+            run(1);
+        }
     }
 }
