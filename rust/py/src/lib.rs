@@ -38,12 +38,11 @@ mod _core {
     #[pymodule_export]
     use crate::forward::jacobian::jacobian;
     #[pymodule_export]
-    #[pymodule_export]
     use crate::forward::sensitivity::{Sensitivity, sensitivity};
     #[pymodule_export]
-    use crate::forward::shape::{_rotation_vector, Shape};
+    use crate::forward::shape::Shape;
     #[pymodule_export]
-    use crate::forward::shape_parts::_shape;
+    use crate::forward::shape_parts::{_rotation_vector, _shape};
     #[pymodule_export]
     use crate::inverse::batch::_inverse_batch;
     #[pymodule_export]

@@ -14,20 +14,46 @@ use crate::model::{Model, Report, State};
 use crate::obstacle::{Fault, FirstFault, Near};
 use crate::robot::Robot;
 use crate::rod::dual_newton::Ending;
-use crate::rod::model::{Rod, read_state, told, write_state};
-use crate::rod::newton_system::Chain;
+use crate::rod::model::{Rod, read_state, report, write_state};
+use crate::rod::newton_system::NewtonSystem;
 use crate::rod::plan::Plan;
 use crate::status::Status;
 
 /// Contacts are listed up to this gap, in shares of the robot's length.
 const TOUCH: f64 = 1e-9;
 /// Buffers of a solve.
+///
+/// ```
+/// use tdcr::rod::contact::Scratch;
+/// # use nalgebra::Vector3;
+/// # use tdcr::model::Model;
+/// # use tdcr::obstacle::{HalfSpace, Obstacle};
+/// # use tdcr::rod::contact::{LoadedRod, Scene};
+/// # use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// // A wall 30 mm beside the robot.
+/// let wall = HalfSpace::new(&Vector3::new(0.03, 0.0, 0.0), &-Vector3::x())?;
+/// let scene = Scene::new(&robot, &plan, &[Obstacle::new(wall, false)], None, 0.0)?;
+/// let rod = LoadedRod::new(&robot, &plan, &scene)?;
+/// let mut scratch = Scratch::default();
+/// rod.solve(&[-0.002, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+/// // No obstacle's function failed.
+/// assert!(scratch.take_fault().is_none());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Default)]
 pub struct Scratch {
     pub(in crate::rod) state: State,
     pub(in crate::rod) descent: Descent,
     /// For the compliance of the tendons at rest.
-    pub(in crate::rod) chain: Chain,
+    pub(in crate::rod) chain: NewtonSystem,
     /// The last solve, or the last load that was reached.
     pub(in crate::rod) kept: Checkpoint,
     pub(in crate::rod) left: Left,
@@ -49,6 +75,31 @@ impl Scratch {
 }
 
 /// A rod in its surroundings, ready to solve.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::model::Model;
+/// # use tdcr::obstacle::{HalfSpace, Obstacle};
+/// # use tdcr::rod::contact::{LoadedRod, Scene};
+/// # use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// // A wall 30 mm beside the robot.
+/// let wall = HalfSpace::new(&Vector3::new(0.03, 0.0, 0.0), &-Vector3::x())?;
+/// let scene = Scene::new(&robot, &plan, &[Obstacle::new(wall, false)], None, 0.0)?;
+/// let rod = LoadedRod::new(&robot, &plan, &scene)?;
+/// let shape = rod.shape(&[-0.01, f64::INFINITY, f64::INFINITY])?;
+/// assert_eq!(shape.report.status, tdcr::Status::Converged);
+/// // It leans on the wall.
+/// assert!(shape.state.contacts.iter().any(|contact| contact.force.x < 0.0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct LoadedRod<'r> {
     rod: Rod<'r>,
@@ -154,7 +205,7 @@ impl<'r> LoadedRod<'r> {
 
     fn finish(&self, work: &mut Scratch, evaluations: usize) -> Report {
         self.written(work);
-        told(work.ending, work.left.worst(), evaluations)
+        report(work.ending, work.left.worst(), evaluations)
     }
 
     /// The shape at hand, written out.
