@@ -1,4 +1,4 @@
-"""What a fit is given, and what it says of how far it stays off."""
+"""Checks of the arguments of a fit, and warnings of what it leaves."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["checked", "far_off", "unsolved", "whole"]
+__all__ = ["check_problem", "far_off", "unsolved", "whole"]
 
 # Root mean square distances from which a fit is no description of what was measured: as a share of
 # the robot's length (calibrated models of a measured one leave 2 to 4 %), and in medians (normal
@@ -65,7 +65,7 @@ def unsolved(failed: int, rows: int) -> list[str]:
     return [f"the forward solve of {failed} of {rows} rows did not converge: see `failed`"]
 
 
-def checked(
+def check_problem(
     robot: Robot,
     displacements: ArrayLike,
     measurements: ArrayLike,
@@ -75,6 +75,7 @@ def checked(
     validation: float,
 ) -> tuple[Problem, Measured]:
     """Check what a fit is given, but for its counts."""
+    # Robot, model, share that is held out.
     if not isinstance(robot, Robot):
         raise TypeError(f"robot: expected Robot, got {type(robot).__name__}")
     if not isinstance(model, str):
@@ -87,6 +88,7 @@ def checked(
     if not 0 <= validation <= 0.9:
         message = f"validation: expected a share in [0, 0.9], got {validation!r}"
         raise InvalidInput(message, "validation")
+    # Names that the model knows, each once.
     if not isinstance(parameters, Iterable):
         raise TypeError(f"parameters: expected names, got {type(parameters).__name__}")
     names = [parameters] if isinstance(parameters, str) else list(parameters)
@@ -98,6 +100,7 @@ def checked(
     if not names or not known_once:
         message = f"parameters: expected some of {known} for model {model!r}, each once"
         raise InvalidInput(f"{message}, got {parameters!r}", "parameters")
+    # Tendons that have what is fitted of them.
     idle = [n for n in names if n in PER_TENDON]
     if idle and not robot.tendons:
         message = f"robot: expected tendons to fit {idle[0]} of, got a robot without any"

@@ -1,4 +1,4 @@
-"""What a fit's parameters are: robots from values, predicted points, their derivatives."""
+"""Parameters of a fit as a vector: robots from values, predicted points, their derivatives."""
 
 from __future__ import annotations
 
@@ -19,10 +19,15 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["NAMES", "PER_TENDON", "Measured", "Problem"]
+__all__ = ["NAMES", "PER_TENDON", "SIZES", "Measured", "Problem"]
 
 PER_TENDON = ("offset", "gain", "radius", "azimuth", "stiffness")
-NAMES = (*PER_TENDON, "poisson_ratio", "rest", "base")
+# Numbers of values by name, K of a robot with K tendons.
+SIZES: dict[str, int | str] = {
+    **dict.fromkeys(PER_TENDON, "K"),
+    **{"poisson_ratio": 1, "rest": 2, "base": 6},
+}
+NAMES = tuple(SIZES)
 # Measured points are no further from the base than so many lengths.
 _FARTHEST = 1e6
 
@@ -100,7 +105,7 @@ class Problem:
     def __init__(self, robot: Robot, names: list[str], model: str, settings: Any) -> None:
         self._given, self._model, self._settings = robot, model, settings
         count, length = len(robot.tendons), robot.backbone.total_length
-        sizes = dict.fromkeys(PER_TENDON, count) | {"poisson_ratio": 1, "rest": 2, "base": 6}
+        sizes = {name: count if size == "K" else int(size) for name, size in SIZES.items()}
         # What changes points by about as much as a shift by the robot's length.
         units: dict[str, Any] = {
             "offset": 1 / length,
@@ -266,10 +271,10 @@ class Problem:
                     if points == 1:
                         moments[disk] = np.cross(arm, axis)
                     gradient = at.adjoint(weights, moments)
-                    for name, slopes in self._chained(shape, given, gradient).items():
+                    for name, slopes in self._chain_rule(shape, given, gradient).items():
                         out[self._slices[name], row, j, c] = slopes
 
-    def _chained(self, shape: Shape, given: Array, by: Any) -> dict[str, Any]:
+    def _chain_rule(self, shape: Shape, given: Array, by: Any) -> dict[str, Any]:
         """Slopes by the values from those by all that a rod is made of."""
         robot = shape.robot
         found: dict[str, Any] = {}

@@ -77,8 +77,8 @@ impl RodInverse<'_> {
         let mut problem =
             TensionProblem::new(self.equilibrium(stop), goal, lengths, &self.units, &self.ranges);
         let mut search = Multistart::<R> { stop, ..Multistart::default() };
-        problem.rod.rest();
-        let given = start.is_some_and(|state| problem.rod.begin(state));
+        problem.rod.reset();
+        let given = start.is_some_and(|state| problem.rod.start_from(state));
         let first: Vec<f64> =
             if given { self.unknowns(problem.rod.tensions()) } else { Vec::new() };
         let before = usize::from(given);
@@ -89,7 +89,7 @@ impl RodInverse<'_> {
         let options =
             SearchOptions { freedom: Freedom::None, fall_back: false, ..self.options(STARTS) };
         let options = SearchOptions { starts: options.starts.min(self.settings.starts), ..options };
-        let mut from_rest = self.from_rest(stop);
+        let mut from_rest = self.rest_solves(stop);
         let found = match &mut from_rest {
             Some(from_rest) => {
                 from_rest.search(&mut problem, &mut search, &self.space, options, start_point)
