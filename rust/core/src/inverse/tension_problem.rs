@@ -74,7 +74,7 @@ impl<'a, G> TensionProblem<'a, G> {
         if !(self.in_equilibrium && wanted.clone().eq(self.tensions.iter().copied())) {
             self.tensions.clear();
             self.tensions.extend(wanted);
-            self.in_equilibrium = self.rod.go(&self.tensions);
+            self.in_equilibrium = self.rod.solve_at(&self.tensions);
             if self.in_equilibrium {
                 self.rod.differentiate();
             }
@@ -161,16 +161,16 @@ impl<const R: usize, G: Goal<R>> Problem<R> for TensionProblem<'_, G> {
     }
 
     fn restart(&mut self) {
-        self.rod.rest();
+        self.rod.reset();
         self.forget();
     }
 
     fn save_state(&mut self) {
-        self.rod.keep(NEAREST);
+        self.rod.save(NEAREST);
     }
 
     fn restore_state(&mut self) {
-        self.rod.go_back(NEAREST);
+        self.rod.restore(NEAREST);
         self.forget();
     }
 

@@ -47,9 +47,9 @@ impl Subsegment {
 pub struct RodSettings {
     /// Kinematics of an element.
     pub subsegment: Subsegment,
-    /// How displacements are imposed.
+    /// Law by which displacements are imposed.
     pub tendons: TendonLaw,
-    /// Whether elements stretch; needs Young's modulus and diameter.
+    /// Elements stretch; needs Young's modulus and diameter.
     pub axial: bool,
     /// Elements between two disks.
     pub elements: usize,
@@ -78,7 +78,7 @@ impl Default for RodSettings {
 
 /// Elements per subsegment at most.
 const MOST_ELEMENTS: usize = 100;
-/// What rounding leaves of a thousand subsegments; below it, shapes that exist would be infeasible.
+/// Rounding of a thousand subsegments; below it, shapes that exist would be infeasible.
 const LEAST_TOLERANCE: f64 = 1e-13;
 
 impl RodSettings {

@@ -49,11 +49,11 @@ pub(super) struct PieceBound {
 /// Rates of what the bound depends on, or weights by them \[m\].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct BoundRate {
-    /// Of the length of the piece at rest.
+    /// Rate of the length of the piece at rest.
     pub(super) piece: f64,
-    /// Of the length of the whole tendon at rest.
+    /// Rate of the length of the whole tendon at rest.
     pub(super) tendon: f64,
-    /// Of the displacement.
+    /// Rate of the displacement.
     pub(super) displacement: f64,
 }
 

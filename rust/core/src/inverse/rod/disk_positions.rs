@@ -77,8 +77,8 @@ impl RodInverse<'_> {
         let mut problem =
             TensionProblem::new(self.equilibrium(stop), goal, lengths, &self.units, &self.ranges);
         let mut search = Multistart::<R> { stop, ..Multistart::default() };
-        problem.rod.rest();
-        let given = start.is_some_and(|state| problem.rod.begin(state));
+        problem.rod.reset();
+        let given = start.is_some_and(|state| problem.rod.start_from(state));
         let first: Vec<f64> =
             if given { self.unknowns(problem.rod.tensions()) } else { Vec::new() };
         let before = usize::from(given);

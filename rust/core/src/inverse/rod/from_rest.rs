@@ -61,12 +61,12 @@ impl<'a> FromRest<'a> {
         if first.status != Status::Converged {
             return first;
         }
-        problem.rod.keep(FIRST_SLOT);
+        problem.rod.save(FIRST_SLOT);
         let mut first_point = search.point.clone();
         let (mut found, mut iterations, mut starts) = (first, first.iterations, first.starts);
         for tried in 1..=ANSWERS {
             let point = search.point.clone();
-            problem.rod.keep(LAST_SLOT);
+            problem.rod.save(LAST_SLOT);
             // Its freedom goes to the least sum T² first, if rest leads to that answer too.
             if options.freedom != Freedom::None {
                 let lower =
@@ -78,7 +78,7 @@ impl<'a> FromRest<'a> {
                         return SearchOutcome { iterations, starts, ..found };
                     }
                     if tried == 1 {
-                        problem.rod.keep(FIRST_SLOT);
+                        problem.rod.save(FIRST_SLOT);
                         first_point.clone_from(&search.point);
                     }
                 }
@@ -133,7 +133,7 @@ impl<'a> FromRest<'a> {
     ) -> bool {
         let mut displacements = vec![0.0; self.robot.tendons().len()];
         problem.write_displacements(&mut displacements);
-        let report = self.rod.lead(&displacements, &mut self.work, self.stop);
+        let report = self.rod.solve_until(&displacements, &mut self.work, self.stop);
         let base = self.robot.base();
         let tip = self.rod.state(&self.work).frames.last().copied();
         let tool = tip.unwrap_or_else(Pose::identity).compose(self.robot.tool());
@@ -161,7 +161,7 @@ fn restore_answer<const R: usize, G: Goal<R>>(
     point: &[f64],
 ) {
     problem.forget();
-    problem.rod.go_back(place);
+    problem.rod.restore(place);
     search.point.clear();
     search.point.extend_from_slice(point);
     search.solver.evaluate(problem, point);

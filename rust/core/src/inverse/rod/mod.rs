@@ -143,7 +143,7 @@ impl<'a> RodInverse<'a> {
         let rest = FreeRod::new(Rod::new(robot, plan));
         let length = robot.backbone().total_length();
         let count = robot.tendons().len();
-        let lever = |k: usize| rest.softness(k).sqrt().max(LEVER * length);
+        let lever = |k: usize| rest.shortening(k).sqrt().max(LEVER * length);
         let units: Vec<f64> = (0..count).map(|k| 1.0 / lever(k)).collect();
         let mut inverse = Self {
             robot,
@@ -296,7 +296,7 @@ impl Inverter for RodInverse<'_> {
         self.robot.check_displacements(displacements)?;
         if let Some(rod) = &self.loaded {
             let mut work = contact::Scratch::default();
-            rod.lead(displacements, &mut work, stop.map(AsRef::as_ref));
+            rod.solve_until(displacements, &mut work, stop.map(AsRef::as_ref));
             return Ok(rod.take_state(work));
         }
         let (mut rod, mut work) = (self.rest.rod().clone(), rod::Scratch::default());
@@ -333,9 +333,9 @@ impl Inverter for RodInverse<'_> {
         }
         work.problem.forget();
         let given = if let Some(state) = start {
-            work.problem.rod.begin(state)
+            work.problem.rod.start_from(state)
         } else {
-            work.problem.rod.rest();
+            work.problem.rod.reset();
             false
         };
         self.search(target, given, self.options(self.settings.starts), work)

@@ -79,7 +79,7 @@ fn derivatives_agree_with_differences_in_contact() {
         // Shapes are balanced to 5e-11 rad.
         check(problem, &z, f64::INFINITY, (1e-3, 3e-6));
         let tensions: Vec<f64> = z.iter().zip(problem.units).map(|(z, unit)| z * unit).collect();
-        assert!(problem.rod.go(&tensions));
+        assert!(problem.rod.solve_at(&tensions));
         let contacts = problem.rod.state().unwrap().contacts;
         assert!(contacts.iter().any(|c| c.force.norm() > 0.0));
     }
