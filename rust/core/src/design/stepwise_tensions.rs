@@ -18,8 +18,8 @@ pub(super) struct Answer {
     pub(super) iterations: usize,
 }
 
-/// Inverts subsegment by subsegment with the tensions that the displacements ask for; none when it finds none.
-/// Tendons that would have to push are slack.
+/// Inverts step by step with the tensions that the displacements ask for; none when it finds none. Tendons that would
+/// have to push are slack.
 pub(super) fn march(
     plan: &Plan,
     base: &Pose,
