@@ -42,7 +42,7 @@ help:
 demo: $(VENV)/installed
 	$(BIN)/tdcr demo --output demo
 
-test: tools rust-checks rust-tests package python-checks python-tests guide runs
+test: tools rust-checks rust-tests package python-checks python-tests runs
 	@echo "all checks passed"
 
 # Says what is missing before anything starts.

@@ -38,12 +38,11 @@ mod _core {
     #[pymodule_export]
     use crate::forward::jacobian::jacobian;
     #[pymodule_export]
-    #[pymodule_export]
     use crate::forward::sensitivity::{Sensitivity, sensitivity};
     #[pymodule_export]
-    use crate::forward::shape::{_rotation_vector, Shape};
+    use crate::forward::shape::Shape;
     #[pymodule_export]
-    use crate::forward::shape_parts::_shape;
+    use crate::forward::shape_parts::{_rotation_vector, _shape};
     #[pymodule_export]
     use crate::inverse::batch::_inverse_batch;
     #[pymodule_export]
@@ -74,11 +73,7 @@ mod _core {
     #[pymodule_export]
     use crate::scene::loads::Loads;
     #[pymodule_export]
-    use crate::scene::mesh::Mesh;
-    #[pymodule_export]
     use crate::scene::obstacle::{Obstacle, clearance};
-    #[pymodule_export]
-    use crate::scene::shapes::{Capsule, Cuboid, Cylinder, HalfSpace, Sphere};
     #[pymodule_export]
     use crate::scene::signed_distance::SignedDistance;
     #[pymodule_export]
@@ -102,6 +97,7 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::scene::shapes::add_shapes(module)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

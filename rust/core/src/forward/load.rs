@@ -4,6 +4,22 @@ use crate::error::InvalidInput;
 use crate::model::{Model, Shape, State};
 
 /// Load of the tendons.
+///
+/// ```
+/// use tdcr::forward::{Forward, Load, ModelSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let forward = Forward::new(&robot, ModelSettings::default())?;
+/// let found = forward.solve(Load::Tensions(vec![0.0; 3]), None)?;
+/// // Without tension the robot is at rest.
+/// assert!(found.displacements.iter().all(|displacement| displacement.abs() < 1e-12));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Load {
     /// Displacements, one per tendon \[m\].
@@ -13,6 +29,23 @@ pub enum Load {
 }
 
 /// Shape with the displacements that it has.
+///
+/// ```
+/// use tdcr::forward::{Forward, Load, ModelSettings, Solution};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let forward = Forward::new(&robot, ModelSettings::default())?;
+/// let load = Load::Displacements(vec![-0.005, f64::INFINITY, f64::INFINITY]);
+/// let Solution { displacements, shape } = forward.solve(load, None)?;
+/// assert_eq!(displacements[0], -0.005);
+/// assert_eq!(shape.report.status, tdcr::Status::Converged);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// Displacements, as given or, under tensions, those that lead to the shape \[m\].

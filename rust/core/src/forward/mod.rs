@@ -28,6 +28,16 @@ pub use task::Rows;
 use task::{ChainedShape, SolveLoad, SolveRows, Task, ToolJacobian};
 
 /// Forward model with its settings.
+///
+/// ```
+/// use tdcr::forward::ModelSettings;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// assert_eq!(ModelSettings::default().model(), "rod");
+/// assert!(ModelSettings::of_model("linkage")?.check_derivatives().is_err());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ModelSettings {
     /// Strain-energy rod.
@@ -111,10 +121,11 @@ impl ModelSettings {
     }
 }
 
-/// Time of a hard solve per second derivative of the rod: hundreds of evaluations of it \[µs\].
-const HARD_ROD: f64 = 50.0;
-/// Likewise among obstacles, meshes for instance \[µs\].
-const HARD_CONTACT: f64 = 2500.0;
+/// Time of a hard solve of a rod per second derivative \[µs\]. A usual one takes 1 µs per subsegment, which has nine.
+const HARD_ROD: f64 = 2.5;
+/// Time of a hard solve among obstacles per second derivative \[µs\]. A usual one takes 10 µs per subsegment among a
+/// few bodies, 180 µs among meshes.
+const HARD_CONTACT: f64 = 125.0;
 
 /// Robot prepared for forward solves: its plan, what surrounds it and a flag that ends solves early.
 ///

@@ -13,6 +13,20 @@ use crate::rod::{self, RodSettings};
 const MOST_PLANS: usize = 8;
 
 /// Everything a model prepares from a robot once, with the model's settings.
+///
+/// ```
+/// use tdcr::forward::{ModelSettings, Plan};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ModelSettings::default())?;
+/// assert_eq!(plan.settings(), ModelSettings::default());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub enum Plan {
     /// Strain-energy rod.

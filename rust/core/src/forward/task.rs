@@ -30,6 +30,24 @@ impl Task for SolveLoad<'_> {
 }
 
 /// Rows of displacements and the fields wanted of them.
+///
+/// ```
+/// use tdcr::batch::{Control, Field, Key, pool};
+/// use tdcr::forward::{Forward, ModelSettings, Rows};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let forward = Forward::new(&robot, ModelSettings::default())?;
+/// let displacements = [0.0, 0.0, 0.0, -0.004, 0.002, 0.002];
+/// let rows = Rows { displacements: &displacements, count: 2, fields: &[Field::Tip], warm: true };
+/// let solved = forward.solve_rows(&rows, &*pool(Some(1))?, &Control::default())?;
+/// assert_eq!(solved.unwrap_or_default().values(Key::Tip).map(<[f64]>::len), Some(2 * 16));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Rows<'a> {
     /// Displacements, row after row (B x K) \[m\].

@@ -6,6 +6,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::Fault;
 
 /// Cell for the first fault of an obstacle's function, with the flag that stops all other work then. Clones share both.
+///
+/// ```
+/// use tdcr::obstacle::FirstFault;
+///
+/// let cell = FirstFault::default();
+/// cell.keep("no map there".into());
+/// cell.keep("too late".into());
+/// assert_eq!(cell.take().map(|fault| fault.to_string()), Some("no map there".to_owned()));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct FirstFault {
     fault: Arc<Mutex<Option<Fault>>>,

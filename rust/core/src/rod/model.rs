@@ -19,6 +19,28 @@ use crate::robot::Robot;
 use crate::status::Status;
 
 /// Buffers of a solve.
+///
+/// ```
+/// use tdcr::model::Model;
+/// use tdcr::rod::{Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let rod = Rod::new(&robot, &plan);
+/// // The same buffers for many solves.
+/// let mut scratch = Scratch::default();
+/// for pull in [0.001, 0.002, 0.003] {
+///     let report = rod.solve(&[-pull, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+///     assert_eq!(report.status, tdcr::Status::Converged);
+/// }
+/// assert!(rod.state(&scratch).tensions[0] > 0.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     pub(super) state: State,
@@ -35,6 +57,24 @@ pub struct Scratch {
 }
 
 /// The rod model of a robot, ready to solve.
+///
+/// ```
+/// use tdcr::model::Model;
+/// use tdcr::rod::{Plan, Rod, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// // One tendon is pulled, the others are free.
+/// let shape = Rod::new(&robot, &plan).shape(&[-0.005, f64::INFINITY, f64::INFINITY])?;
+/// assert_eq!(shape.report.status, tdcr::Status::Converged);
+/// assert!(shape.state.tensions.iter().all(|tension| *tension >= 0.0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Rod<'r> {
     pub(super) robot: &'r Robot,

@@ -8,6 +8,22 @@ use crate::error::InvalidInput;
 use crate::robot::{Robot, Tendon};
 
 /// A robot prepared for the rod model.
+///
+/// ```
+/// use tdcr::rod::{Plan, Rod, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// // One plan serves any number of solves.
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let rod = Rod::new(&robot, &plan);
+/// assert!((rod.rest_lengths()[0] - 0.2).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(crate) settings: RodSettings,

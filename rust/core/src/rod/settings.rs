@@ -4,6 +4,13 @@ use super::tendon_law::TendonLaw;
 use crate::error::InvalidInput;
 
 /// Kinematics of an element (design rule of the papers, or a rod's own).
+///
+/// ```
+/// use tdcr::rod::{RodSettings, Subsegment};
+///
+/// let settings = RodSettings { subsegment: Subsegment::Link, ..RodSettings::default() };
+/// assert_eq!(settings.subsegment.as_str(), "link");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Subsegment {
     /// A constant-strain arc.
@@ -28,6 +35,14 @@ impl Subsegment {
 }
 
 /// Choices of the rod model.
+///
+/// ```
+/// use tdcr::rod::RodSettings;
+///
+/// let settings = RodSettings { elements: 2, ..RodSettings::default() };
+/// assert!(settings.validate().is_ok());
+/// assert!(RodSettings { elements: 0, ..settings }.validate().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RodSettings {
     /// Kinematics of an element.

@@ -6,6 +6,13 @@
 use crate::error::InvalidInput;
 
 /// Law of a tendon that runs from hole to hole: how its displacement is imposed.
+///
+/// ```
+/// use tdcr::rod::{RodSettings, TendonLaw};
+///
+/// let settings = RodSettings { tendons: TendonLaw::Proportional, ..RodSettings::default() };
+/// assert_eq!(settings.tendons.as_str(), "proportional");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum TendonLaw {
     /// The total length is bounded; no friction. The multiplier is the tension.

@@ -1,8 +1,5 @@
 //! The engines of `tdcr.design`; its docstrings are in Python.
 
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -18,9 +15,8 @@ use crate::robot::Robot;
 use crate::settings::fields::Choice as _;
 use crate::settings::prebend::PrebendSettings;
 
-/// Products of small matrices in a descent, of about a microsecond each with all its starts, up to which a design
-/// ends soon enough to go without listening for Ctrl-C.
-const SOON: usize = 100_000;
+/// Estimated time of a product of small matrices in a descent, with all its starts \[µs\].
+const MICROSECONDS_PER_PRODUCT: f64 = 0.5;
 
 /// Robot, shape, errors, iterations, status and message of a design.
 #[pyfunction]
@@ -34,14 +30,11 @@ pub(crate) fn _prebend<'py>(
     let targets = vectors("target_positions", targets)?;
     let pulls = one_row(robot, displacements)?;
     let (core, settings) = (&robot.get().0, settings.get().0);
-    let solve =
-        |stop: &Arc<AtomicBool>| prebend_stopped_by(core, &targets, &pulls, &settings, stop);
-    let work = targets.len().pow(3) * settings.rod.elements;
-    let answer = if work.saturating_mul(settings.max_iterations) <= SOON {
-        py.detach(|| solve(&Arc::default()))
-    } else {
-        interruptible::run(py, None, |control| solve(&control.stop))?
-    };
+    let products = (targets.len().pow(3) * settings.rod.elements) as f64;
+    let microseconds = products * settings.max_iterations as f64 * MICROSECONDS_PER_PRODUCT;
+    let answer = interruptible::run_if_long(py, microseconds, |control| {
+        prebend_stopped_by(core, &targets, &pulls, &settings, &control.stop)
+    })?;
     let answer = answer.map_err(|e| invalid(&e))?;
     let disks = answer.errors.len();
     let robot = Robot::from(answer.robot);

@@ -15,7 +15,8 @@ use crate::robot::Robot;
 use crate::settings::bounds::range;
 use crate::settings::routing::RoutingSettings;
 
-/// Robot, shape, displacements, holes, errors, root mean squares, optimality, iterations, evaluations, status and message.
+/// Robot, shape, displacements, holes, errors, root mean squares, optimality, iterations, evaluations, status and
+/// message.
 fn told<'py>(
     py: Python<'py>,
     answer: Routed,
@@ -70,7 +71,7 @@ pub(crate) fn _routing<'py>(
     told(py, answer.map_err(|e| invalid(&e))?, &settings)
 }
 
-/// The same of every row, on `threads`.
+/// Routings of every row, on `threads`.
 #[pyfunction]
 pub(crate) fn _routing_batch<'py>(
     py: Python<'py>,

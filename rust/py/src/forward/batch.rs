@@ -9,7 +9,7 @@ use tdcr::batch::{Field, Key, Solved, pool};
 use tdcr::forward::{Forward, Rows, Solution};
 
 use crate::convert::arguments::{optional, whole};
-use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
+use crate::convert::arrays::{float_array, frozen, frozen_statuses, invalid, values, wrong_shape};
 use crate::convert::interruptible;
 use crate::forward::model_choice::model_settings;
 use crate::forward::run;
@@ -46,6 +46,7 @@ pub(crate) fn _forward_batch<'py>(
     let around = Surroundings::new(py, Some(obstacles), loads)?;
     let core = &robot.get().0;
     let tendons = core.tendons().len();
+    // A row of displacements per solve.
     let array = float_array("displacements", displacements)?;
     let &[rows, columns] = array.shape() else {
         let expected = format!("shape (B, {tendons}); forward takes ({tendons},)");
@@ -55,12 +56,14 @@ pub(crate) fn _forward_batch<'py>(
         let expected = format!("shape (B, {tendons}), one column per tendon");
         return Err(wrong_shape("displacements", &expected, array.shape()));
     }
+    // Fields and threads.
     let fields = fields.iter().map(|name| Field::named(name)).collect::<Result<Vec<_>, _>>();
     let fields = fields.map_err(|e| invalid(&e))?;
     let threads = optional("threads", threads, whole)?;
     let pool = pool(threads).map_err(|e| invalid(&e))?;
     let flat = values(&array)?;
     let wanted = Rows { displacements: flat, count: rows, fields: &fields, warm };
+    // All rows on the pool.
     let forward = around.prepare(core, settings)?;
     let (solved, fault) = interruptible::run(py, progress, |control| {
         around.stopped_by(&control.stop);
@@ -107,6 +110,7 @@ fn export<'py>(
     solved: Solved,
 ) -> PyResult<Bound<'py, PyDict>> {
     let &Rows { displacements, count: rows, fields, .. } = wanted;
+    // Fields that are there even without rows.
     let answer = PyDict::new(py);
     answer.set_item("displacements", frozen(py, displacements.to_vec(), &[rows, tendons])?)?;
     if fields.contains(&Field::Contacts) {
@@ -115,6 +119,7 @@ fn export<'py>(
     if fields.contains(&Field::TendonPoints) {
         answer.set_item(Field::TendonPoints.as_str(), PyList::empty(py))?;
     }
+    // Columns of the models, tendon points by tendon.
     for column in solved.columns {
         let shape: Vec<usize> = std::iter::once(rows).chain(column.shape).collect();
         let array = frozen(py, column.values, &shape)?;
@@ -128,16 +133,14 @@ fn export<'py>(
             _ => answer.set_item(name, array)?,
         }
     }
-    let mut statuses = Vec::with_capacity(rows);
-    for report in &solved.reports {
-        statuses.push(status(py, report.status)?.unbind());
-    }
-    answer.set_item("status", frozen(py, statuses, &[rows])?)?;
-    let ok = solved.reports.iter().map(|r| r.status == Status::Converged).collect();
+    // Report of every row.
+    let reports = &solved.reports;
+    answer.set_item("status", frozen_statuses(py, reports.iter().map(|r| r.status))?)?;
+    let ok = reports.iter().map(|r| r.status == Status::Converged).collect();
     answer.set_item("ok", frozen::<bool>(py, ok, &[rows])?)?;
-    let residual = solved.reports.iter().map(|r| r.residual).collect();
+    let residual = reports.iter().map(|r| r.residual).collect();
     answer.set_item("residual", frozen::<f64>(py, residual, &[rows])?)?;
-    let iterations = solved.reports.iter().map(|r| r.iterations as u64).collect();
+    let iterations = reports.iter().map(|r| r.iterations as u64).collect();
     answer.set_item("iterations", frozen::<u64>(py, iterations, &[rows])?)?;
     Ok(answer)
 }

@@ -34,8 +34,8 @@ use crate::robot::Robot;
 ///     rod that is just as long as it may be, without tension, is followed on its pulled side, where it
 ///     moves the tip: so are all tendons at rest, held at 0. That holds for changes that leave all of
 ///     these under tension, not for one that lets some go slack: free (`inf`) those. Where taut
-///     tendons depend on each other (three on one inextensible segment) no displacement can change alone: the columns are then those
-///     of the nearest change that the rod can follow.
+///     tendons depend on each other (three on one inextensible segment) no displacement can change
+///     alone: the columns are then those of the nearest change that the rod can follow.
 ///
 /// Raises
 /// ------

@@ -5,6 +5,7 @@ pub(crate) mod jacobian;
 pub(crate) mod model_choice;
 pub(crate) mod sensitivity;
 pub(crate) mod shape;
+pub(crate) mod shape_arrays;
 pub(crate) mod shape_parts;
 
 use numpy::PyUntypedArrayMethods;
@@ -71,7 +72,8 @@ use crate::scene::{Surroundings, raise_fault};
 ///     Both or neither of displacements and tensions, NaN, -inf, another number of values than
 ///     tendons, a (B, K) array, a negative or infinite tension, tensions, obstacles, loads or a start for
 ///     another model than the rod, proportional tendons with tensions, obstacles or loads, loads without
-///     Young's modulus or with another number of `disk_forces` than disks, a start of another robot, model or number of elements, an unknown model, settings of
+///     Young's modulus or with another number of `disk_forces` than disks, a start of another robot,
+///     model or number of elements, an unknown model, settings of
 ///     another model, axial strain or elastic tendons without Young's modulus; in the models that take
 ///     no others a pre-bent backbone, a routing, two linkage tendons on one azimuth.
 /// TypeError

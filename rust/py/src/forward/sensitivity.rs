@@ -75,7 +75,9 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
     }
     let plan = Plan::rod(own.core_robot(), settings).map_err(|e| invalid(&e))?;
     let forward = Forward::new(own.core_robot(), own.model_settings()).map_err(|e| invalid(&e))?;
-    let at = run(py, forward, None, |forward| forward.linearize(own.state(), own.given()))?;
+    let at = run(py, forward, None, |forward| {
+        forward.linearize(own.state(), own.displacement_values())
+    })?;
     Ok(Sensitivity { shape: shape.clone().unbind(), plan, at })
 }
 
@@ -84,7 +86,8 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
 /// Tendons under tension count, and those that are just as long as they may be: the latter are followed on
 /// their pulled side, at rest for instance, for changes that let none of them go slack. Free and slack ones
 /// do not. Where tendons that count depend on each other (`dependent`), displacements cannot change one by
-/// one: derivatives are then those of the nearest change that the rod can follow. With proportional tendons, tensions are those of the base pieces.
+/// one: derivatives are then those of the nearest change that the rod can follow. With proportional tendons,
+/// tensions are those of the base pieces.
 #[pyclass(frozen, eq, module = "tdcr")]
 pub(crate) struct Sensitivity {
     shape: Py<Shape>,
@@ -117,7 +120,7 @@ impl Sensitivity {
         self.shape.clone_ref(py)
     }
 
-    /// Whether tendons that count depend on each other: three on one inextensible segment, tendons that
+    /// True if tendons that count depend on each other: three on one inextensible segment, tendons that
     /// share all holes.
     #[getter]
     fn dependent(&self) -> bool {
@@ -134,7 +137,7 @@ impl Sensitivity {
         frozen_columns(py, &py.detach(|| self.core().jacobian(self.robot().tool())))
     }
 
-    /// What a change of everything at once does to the shape, to first order.
+    /// First-order effect of a change of everything at once on the shape.
     ///
     /// Parameters
     /// ----------

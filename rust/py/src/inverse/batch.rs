@@ -10,7 +10,7 @@ use tdcr::inverse::{Answer, InverseRows, Inverter, Target, invert_path, invert_r
 use tdcr::{InvalidInput, Status};
 
 use crate::convert::arguments::{optional, whole};
-use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
+use crate::convert::arrays::{float_array, frozen, frozen_statuses, invalid, values, wrong_shape};
 use crate::convert::interruptible;
 use crate::inverse::targets::many_targets;
 use crate::inverse::{Engine, Plans, one_start};
@@ -97,11 +97,7 @@ fn export(py: Python<'_>, rows: InverseRows, tendons: usize) -> PyResult<Bound<'
     let columns = PyDict::new(py);
     columns.set_item("displacements", frozen(py, displacements, &[answers.len(), tendons])?)?;
     columns.set_item("tensions", frozen(py, tensions, &[answers.len(), tendons])?)?;
-    let mut statuses = Vec::with_capacity(answers.len());
-    for answer in &answers {
-        statuses.push(status(py, answer.status)?.unbind());
-    }
-    columns.set_item("status", frozen(py, statuses, &count)?)?;
+    columns.set_item("status", frozen_statuses(py, answers.iter().map(|a| a.status))?)?;
     let floats = |column: fn(&Answer) -> f64| answers.iter().map(column).collect::<Vec<f64>>();
     columns.set_item("error", frozen(py, floats(|a| a.distance), &count)?)?;
     columns.set_item("rotation_error", frozen(py, floats(|a| a.angle), &count)?)?;

@@ -29,19 +29,18 @@ use crate::scene::{Surroundings, raise_fault};
 use crate::settings::bounds::Bounds;
 use crate::settings::inverse::InverseSettings;
 
-/// Steps and evaluations, of a few tenths of a microsecond each, up to which a single inverse ends soon
-/// enough to go without listening for Ctrl-C.
-const SOON: usize = 200_000;
+/// Time of a step or an evaluation of arcs \[µs\].
+const MICROSECONDS_PER_ARC_STEP: f64 = 0.25;
 
-/// How many times as long those of the rod take.
-const ROD: usize = 100;
+/// Time of a step or an evaluation of a rod \[µs\].
+const MICROSECONDS_PER_ROD_STEP: f64 = 25.0;
 
-/// Whether it does, by what a step takes.
-fn soon(search: &tdcr::inverse::InverseSettings, each: usize) -> bool {
+/// Estimated time of a single inverse that uses all its starts and steps \[µs\].
+fn estimated_microseconds(search: &tdcr::inverse::InverseSettings, per_step: f64) -> f64 {
     let starts = if search.method == Method::Swarm { search.starts } else { 1 };
-    let swarms = search.swarm.particles.saturating_mul(search.swarm.max_iterations);
-    let steps = search.starts.saturating_mul(search.max_iterations);
-    steps.saturating_add(swarms.saturating_mul(starts)).saturating_mul(each) <= SOON
+    let swarms = search.swarm.particles as f64 * search.swarm.max_iterations as f64;
+    let steps = search.starts as f64 * search.max_iterations as f64;
+    (steps + swarms * starts as f64) * per_step
 }
 
 /// The model's knowledge of a robot, which an inverse refers to.
@@ -181,15 +180,19 @@ pub(crate) fn _inverse(
     let found = match (&engine, positions) {
         (Engine::Arcs(_), Some(_)) => return Err(invalid(&rod_only("positions", model))),
         (Engine::Arcs(inverse), None) => {
-            let soon = soon(inverse.settings(), 1);
-            invert_one(py, &**inverse, target, start, &around, soon)?
+            let time = estimated_microseconds(inverse.settings(), MICROSECONDS_PER_ARC_STEP);
+            invert_one(py, &**inverse, target, start, &around, time)?
         }
         (Engine::Rod(inverse), positions) => {
-            let soon = around.any().is_none() && soon(inverse.settings(), ROD);
+            // Among obstacles there is no bound.
+            let time = match around.any() {
+                None => estimated_microseconds(inverse.settings(), MICROSECONDS_PER_ROD_STEP),
+                Some(_) => f64::INFINITY,
+            };
             // First: an interrupt stops the functions of obstacles too.
             let found = match positions {
                 Some(positions) => invert_positions(py, inverse, positions, start, &around)?,
-                None => invert_one(py, &**inverse, target, start, &around, soon)?,
+                None => invert_one(py, &**inverse, target, start, &around, time)?,
             };
             raise_fault(py, inverse.take_fault())?;
             found
@@ -257,7 +260,7 @@ fn invert_one<I: Inverter>(
     target: Option<&Bound<'_, PyAny>>,
     start: Option<&Bound<'_, PyAny>>,
     around: &Surroundings,
-    soon: bool,
+    microseconds: f64,
 ) -> PyResult<Result<Inversion, InvalidInput>> {
     let Some(target) = target else {
         return Ok(Err(InvalidInput::new("target", "a target or positions", "neither")));
@@ -265,13 +268,9 @@ fn invert_one<I: Inverter>(
     let target = one_target(target)?;
     inverse.check_target(&target).map_err(|e| invalid(&e))?;
     let start = one_start(inverse.robot(), start)?;
-    let solve = |stop: Option<&_>| invert(inverse, &target, start.as_deref(), stop);
-    if soon {
-        return Ok(py.detach(|| solve(None)));
-    }
-    interruptible::run(py, None, |control| {
+    interruptible::run_if_long(py, microseconds, |control| {
         around.stopped_by(&control.stop);
-        solve(Some(&control.stop))
+        invert(inverse, &target, start.as_deref(), Some(&control.stop))
     })
 }
 

@@ -43,7 +43,7 @@ use crate::robot::tendon::Tendon;
 #[derive(Clone)]
 pub(crate) struct Robot(pub(crate) Arc<core::Robot>, Arc<Kept>);
 
-/// What is built on first use and kept with the robot.
+/// Parts that are built on first use and kept with the robot.
 #[derive(Default)]
 struct Kept {
     base: Lazy,

@@ -24,7 +24,7 @@ use tdcr::rod::contact::Scene;
 use crate::convert::arguments::wrong_type;
 use crate::convert::arrays::invalid;
 use crate::scene::loads::Loads;
-use crate::scene::obstacle::{obstacles, raised};
+use crate::scene::obstacle::{fault_exception, obstacles};
 
 /// Obstacles, as Python knows them and as the core does, and loads.
 pub(crate) struct Surroundings {
@@ -71,7 +71,7 @@ impl Surroundings {
         self.stop.get_or_init(|| Arc::clone(stop));
     }
 
-    /// What there is, for those who do not take it: the name of the argument.
+    /// Name of the argument that is given, for models that take none.
     pub(crate) fn any(&self) -> Option<&'static str> {
         if !self.obstacles.is_empty() {
             return Some("obstacles");
@@ -154,7 +154,9 @@ fn listening(obstacle: Obstacle, index: Option<usize>, stop: &Stop) -> Obstacle 
 pub(crate) fn raise_fault(py: Python<'_>, fault: Option<Fault>) -> PyResult<()> {
     let Some(fault) = fault else { return Ok(()) };
     Err(match fault.downcast::<Named>() {
-        Ok(named) => raised(py, named.fault, Some(&format!("obstacles[{}]", named.obstacle))),
-        Err(fault) => raised(py, fault, None),
+        Ok(named) => {
+            fault_exception(py, named.fault, Some(&format!("obstacles[{}]", named.obstacle)))
+        }
+        Err(fault) => fault_exception(py, fault, None),
     })
 }

@@ -89,7 +89,7 @@ impl RodInverse<'_> {
         let options =
             SearchOptions { freedom: Freedom::None, fall_back: false, ..self.options(STARTS) };
         let options = SearchOptions { starts: options.starts.min(self.settings.starts), ..options };
-        let mut from_rest = self.from_rest(stop);
+        let mut from_rest = self.rest_solves(stop);
         let found = match &mut from_rest {
             Some(from_rest) => {
                 from_rest.search(&mut problem, &mut search, &self.space, options, start_point)

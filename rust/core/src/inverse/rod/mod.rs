@@ -185,7 +185,7 @@ impl<'a> RodInverse<'a> {
         }
     }
 
-    fn from_rest<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Option<FromRest<'w>> {
+    fn rest_solves<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Option<FromRest<'w>> {
         self.loaded.as_ref().map(|rod| FromRest::new(rod, self.robot, stop))
     }
 
@@ -296,7 +296,7 @@ impl Inverter for RodInverse<'_> {
         self.robot.check_displacements(displacements)?;
         if let Some(rod) = &self.loaded {
             let mut work = contact::Scratch::default();
-            rod.lead(displacements, &mut work, stop.map(AsRef::as_ref));
+            rod.solve_until(displacements, &mut work, stop.map(AsRef::as_ref));
             return Ok(rod.take_state(work));
         }
         let (mut rod, mut work) = (self.rest.rod().clone(), rod::Scratch::default());
@@ -322,7 +322,7 @@ impl Inverter for RodInverse<'_> {
             bends: Vec::new(),
             met: false,
             before: None,
-            from_rest: self.from_rest(stop),
+            from_rest: self.rest_solves(stop),
         }
     }
 

@@ -21,6 +21,28 @@ use crate::solve::dense::{backward, dot, forward};
 use crate::solve::pseudo_inverse::PseudoInverse;
 
 /// Change q of what a rod is made of, or a gradient by it.
+///
+/// ```
+/// # use tdcr::model::Model;
+/// # use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, RodSettings::default())?;
+/// # let rod = Rod::new(&robot, &plan);
+/// # let mut scratch = Scratch::default();
+/// let displacements = [-0.005, f64::INFINITY, f64::INFINITY];
+/// rod.solve(&displacements, &mut scratch)?;
+/// let sensitivity = rod.sensitivity(&displacements, &scratch);
+/// let zero = sensitivity.no_change();
+/// // No change of anything moves nothing.
+/// assert_eq!(sensitivity.forward(&zero).velocities[10].norm(), 0.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
     /// Change of each displacement \[m\].
@@ -36,6 +58,29 @@ pub struct Change {
 }
 
 /// Variation of the shape by a change.
+///
+/// ```
+/// # use tdcr::model::Model;
+/// # use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, RodSettings::default())?;
+/// # let rod = Rod::new(&robot, &plan);
+/// # let mut scratch = Scratch::default();
+/// let displacements = [-0.005, f64::INFINITY, f64::INFINITY];
+/// rod.solve(&displacements, &mut scratch)?;
+/// let sensitivity = rod.sensitivity(&displacements, &scratch);
+/// let zero = sensitivity.no_change();
+/// let change = Change { displacements: vec![1.0, 0.0, 0.0], ..zero };
+/// let variation = sensitivity.forward(&change);
+/// assert_eq!((variation.strains.len(), variation.spins.len()), (3 * 10, 11));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variation {
     /// Rate of every element's strain: rotation vector, and elongation where there is one.
@@ -54,6 +99,31 @@ const AT_BOUND: f64 = 1e-9;
 const LEVERLESS: f64 = 1e-24;
 
 /// Solved rod, linearized: factored, and without the robot.
+///
+/// ```
+/// use std::sync::Arc;
+/// # use tdcr::model::Model;
+/// # use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, RodSettings::default())?;
+/// # let rod = Rod::new(&robot, &plan);
+/// # let mut scratch = Scratch::default();
+/// let displacements = [-0.005, f64::INFINITY, f64::INFINITY];
+/// rod.solve(&displacements, &mut scratch)?;
+/// let sensitivity = rod.sensitivity(&displacements, &scratch);
+/// let zero = sensitivity.no_change();
+/// // Kept without the robot, for as long as its derivatives are wanted.
+/// let kept: Arc<tdcr::rod::Linearized> = sensitivity.linearized();
+/// let again = rod.sensitivity_at(kept);
+/// assert_eq!(again.forward(&zero).tensions, sensitivity.forward(&zero).tensions);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Linearized {
     displacements: Vec<f64>,
@@ -72,6 +142,30 @@ pub struct Linearized {
 }
 
 /// Derivatives of one solved shape.
+///
+/// ```
+/// # use tdcr::model::Model;
+/// # use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, RodSettings::default())?;
+/// # let rod = Rod::new(&robot, &plan);
+/// # let mut scratch = Scratch::default();
+/// let displacements = [-0.005, f64::INFINITY, f64::INFINITY];
+/// rod.solve(&displacements, &mut scratch)?;
+/// let sensitivity = rod.sensitivity(&displacements, &scratch);
+/// let zero = sensitivity.no_change();
+/// // Tip velocity per metre of each displacement.
+/// let change = Change { displacements: vec![1.0, 0.0, 0.0], ..zero };
+/// let variation = sensitivity.forward(&change);
+/// assert!(variation.velocities[10].x < 0.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Sensitivity<'r> {
     rod: Rod<'r>,
