@@ -1,9 +1,9 @@
 //! The rod among obstacles and under loads: minimum of its energy under inequalities, by an augmented Lagrangian.
 //!
-//! The mathematics is in `docs/contact.md`, whose letters the code uses. From the bottom up: [`scene`] and [`loads`]
-//! are what surrounds a robot, [`potential`] and [`lagrangian`] the function that is minimised, [`riccati`] its Newton
-//! step, [`augmented_lagrangian`] the minimisation at given multipliers and their updates, [`continuation`] the way
-//! from rest in load steps, whose places [`load_state`] keeps, and [`model`] the forward model.
+//! The mathematics is in `docs/contact.md`, whose letters the code uses. From the bottom up: `scene` and `loads`
+//! are what surrounds a robot, `potential` and `lagrangian` the function that is minimised, `riccati` its Newton
+//! step, `augmented_lagrangian` the minimisation at given multipliers and their updates, `continuation` the way
+//! from rest in load steps, whose places `load_state` keeps, and `model` the forward model.
 
 mod augmented_lagrangian;
 mod continuation;
@@ -14,6 +14,7 @@ mod model;
 mod potential;
 mod riccati;
 mod scene;
+mod start;
 
 pub(super) use load_state::{Checkpoint, TendonTarget};
 pub use loads::Loads;
