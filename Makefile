@@ -68,9 +68,9 @@ $(VENV)/equipped: $(VENV)/created pyproject.toml
 	$(BIN)/pip install --quiet 'maturin>=1.14,<2' --group test --group peers --group docs
 	@touch $@
 
-# The profile of the tests, whose compiled core it shares. Once installed, only the compiled module changes.
+# Optimised, and yet a change compiles alone. Once installed, only the compiled module changes.
 develop: $(VENV)/equipped
-	$(BIN)/maturin develop --locked --profile test $(if $(wildcard $(VENV)/editable),--skip-install,--extras $(EXTRAS))
+	$(BIN)/maturin develop --locked --profile develop $(if $(wildcard $(VENV)/editable),--skip-install,--extras $(EXTRAS))
 	@rm -f $(VENV)/installed
 	@touch $(VENV)/editable
 
