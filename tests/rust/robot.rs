@@ -203,8 +203,7 @@ fn displacements_are_checked() {
 }
 
 #[test]
-// Plans that a robot keeps are no part of its hash.
-#[allow(clippy::mutable_key_type)]
+#[allow(clippy::mutable_key_type)] // The plans kept with a robot are no part of its value.
 fn equality_and_hash_are_by_value() {
     let build = |azimuth: f64, name: Option<&str>| {
         let tendons = vec![Tendon::straight(azimuth, 0.01).unwrap()];

@@ -14,6 +14,7 @@ mod model;
 mod potential;
 mod riccati;
 mod scene;
+mod start;
 
 pub(super) use load_state::{Checkpoint, TendonTarget};
 pub use loads::Loads;

@@ -4,14 +4,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::augmented_lagrangian::{Minimizer, Residuals};
-use super::lagrangian::MultiplierEstimate;
 use super::load_state::{Checkpoint, TendonTarget};
-use super::scene::{DiskPoint, Scene};
+use super::scene::Scene;
 use crate::error::InvalidInput;
-use crate::lie::Pose;
 use crate::model::Contact;
 use crate::model::{Model, Report, State};
-use crate::obstacle::{Fault, FirstFault, Near};
+use crate::obstacle::{Fault, FirstFault};
 use crate::robot::Robot;
 use crate::rod::dual_newton::Ending;
 use crate::rod::model::{Rod, read_state, report, write_state};
@@ -20,7 +18,7 @@ use crate::rod::plan::Plan;
 use crate::status::Status;
 
 /// Contacts are listed up to this gap, in shares of the robot's length.
-const TOUCHING: f64 = 1e-9;
+pub(super) const TOUCHING: f64 = 1e-9;
 /// Distance up to which parts of obstacles count, as a share of a subsegment.
 const DETECTION: f64 = 0.5;
 
@@ -216,63 +214,6 @@ impl<'r> LoadedRod<'r> {
         }
         self.write_shape(work);
         report(work.ending, work.residuals.largest(), most - budget)
-    }
-
-    /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
-    pub(in crate::rod) fn recall_contacts(&self, start: &State, work: &mut Scratch) {
-        let (plan, base) = (self.plan(), self.rod.robot.base());
-        let detection = self.detection_distance();
-        let mut near = Vec::new();
-        for contact in start.contacts.iter().filter(|c| c.disk < self.scene.points.len()) {
-            // The point and the obstacle that the contact names.
-            let is_own = |p: &DiskPoint| (p.kind, p.tendon) == (contact.kind, contact.tendon);
-            let points = &self.scene.points[contact.disk];
-            let (Some(p), Some(obstacle)) =
-                (points.iter().position(is_own), self.scene.obstacles.get(contact.obstacle))
-            else {
-                continue;
-            };
-            // The part of the obstacle whose normal is nearest to the contact's.
-            let position = base.inverse().transform(&contact.point);
-            let normal = base.rotation.tr_mul(&contact.normal);
-            near.clear();
-            // A fault comes again, and is reported, where the shape is evaluated.
-            if obstacle.constraints(&position, detection + points[p].radius, &mut near).is_err() {
-                return;
-            }
-            let along = |part: &Near| part.gradient.dot(&normal);
-            let Some(part) = near.iter().max_by(|a, b| along(a).total_cmp(&along(b))) else {
-                continue;
-            };
-            let key = (contact.disk, p, contact.obstacle, part.feature);
-            let force = contact.force.norm() / plan.unit;
-            let estimate = MultiplierEstimate::new(key, force, &position, part);
-            work.minimizer.estimates.contacts.push(estimate);
-        }
-        work.minimizer.estimates.contacts.sort_by_key(|own| own.key);
-    }
-
-    /// Measures how deep the undeformed robot is in the obstacles.
-    pub(in crate::rod) fn measure_penetration(&self, work: &mut Scratch) -> Result<(), Fault> {
-        work.initial_penetration = None;
-        let mut frame = Pose::identity();
-        let plan = self.plan();
-        for (disk, points) in self.scene.points.iter().enumerate() {
-            if disk > 0 {
-                frame = frame.compose(&work.chain.ends[disk - 1]);
-            }
-            for point in points {
-                for (o, obstacle) in self.scene.obstacles.iter().enumerate() {
-                    let near = obstacle.nearest(&frame.transform(&point.position))?;
-                    let depth = point.radius - near.distance;
-                    let deepest = work.initial_penetration.map(|(depth, _, _)| depth);
-                    if depth > deepest.unwrap_or(TOUCHING * plan.total_length()) {
-                        work.initial_penetration = Some((depth, o, disk));
-                    }
-                }
-            }
-        }
-        Ok(())
     }
 
     /// Writes the shape at hand, in the world.
