@@ -103,6 +103,14 @@ impl TendonLaw {
         }
     }
 
+    /// Bound of the length of a piece's equation, for the lengths at rest of the piece and of its whole tendon.
+    pub(super) fn bound(self, piece: f64, tendon: f64, displacement: f64) -> f64 {
+        match self {
+            Self::Sliding => tendon + displacement,
+            Self::Proportional => (1.0 + displacement / tendon) * piece,
+        }
+    }
+
     /// Derivative of a piece's bound by its tendon's displacement.
     pub(super) fn bound_slope(self, piece: f64, tendon: f64) -> f64 {
         match self {
