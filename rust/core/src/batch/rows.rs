@@ -293,6 +293,6 @@ fn write_points(place: &mut [f64], points: impl Iterator<Item = Vector3<f64>>) {
 }
 
 /// The same error, saying in which row.
-fn in_row(error: InvalidInput, row: usize) -> InvalidInput {
+pub(crate) fn in_row(error: InvalidInput, row: usize) -> InvalidInput {
     InvalidInput { got: format!("{} in row {row}", error.got), ..error }
 }

@@ -16,12 +16,12 @@ use crate::status::Status;
 pub struct Scratch {
     state: State,
     /// The arc of every segment.
-    arcs: Vec<Arc>,
+    pub(super) arcs: Vec<Arc>,
     /// Displacement given minus displacement of the arcs, per tendon; 0 where it does not count.
     misfit: Vec<f64>,
-    counted: Vec<bool>,
+    pub(super) counted: Vec<bool>,
     /// The inverse for the last pattern of counted tendons that was not "all".
-    masked: Option<Masked>,
+    pub(super) masked: Option<Masked>,
 }
 
 impl Scratch {
@@ -35,8 +35,8 @@ impl Scratch {
 /// The constant-curvature model of a robot, ready to solve.
 #[derive(Clone, Debug)]
 pub struct ConstantCurvature<'r> {
-    robot: &'r Robot,
-    plan: &'r Plan,
+    pub(super) robot: &'r Robot,
+    pub(super) plan: &'r Plan,
 }
 
 /// Share of a tendon's length by which displacements may miss the arcs without being called
