@@ -6,7 +6,7 @@ use crate::rod::RodSettings;
 /// Choices of a pre-bent design.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrebendSettings {
-    /// Of the rod model that the design is for.
+    /// Settings of the rod model that the design is for.
     pub rod: RodSettings,
     /// Largest bend of a subsegment at rest \[rad\].
     pub max_bend: f64,

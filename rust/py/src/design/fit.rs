@@ -14,8 +14,8 @@ use crate::convert::interruptible;
 use crate::forward::model_choice::{Choice, rod_only};
 use crate::robot::Robot;
 
-/// Robot, values and standard errors by name, residuals after and before, flat, rows that failed, names at their bounds, steps,
-/// and whether they converged.
+/// Robot, values and standard errors by name, residuals after and before, rows that failed, names at their bounds,
+/// steps, and whether they converged.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // What a fit is made of.
 pub(crate) fn _fit<'py>(
@@ -38,18 +38,21 @@ pub(crate) fn _fit<'py>(
     let kinds: Vec<Parameter> = (parameters.iter())
         .filter_map(|name| Parameter::ALL.into_iter().find(|kind| kind.as_str() == name))
         .collect();
+    // Rows as the core has them.
     let points = float_array("measurements", points)?;
     let shape = points.shape().to_vec();
     let points = values(&points)?.chunks_exact(3).map(Vector3::from_column_slice).collect();
     let displacements = values(&float_array("displacements", displacements)?)?.to_vec();
     let measured = Measured { displacements, points, held_out };
     let settings = FitSettings { model, robust, max_iterations };
+    // On all cores, listening for Ctrl-C.
     let (core, pool) = (&robot.get().0, pool(None).map_err(|e| invalid(&e))?);
     let found = interruptible::run(py, None, |control| {
         fit(core, &measured, &kinds, &settings, &pool, control)
     })?;
     // Stopped only by an interrupt, which run has raised.
     let Some(found) = found.map_err(|e| invalid(&e))? else { return Ok(PyTuple::empty(py)) };
+    // Values by name, and the rest as Python has it.
     let (estimates, errors) = (PyDict::new(py), PyDict::new(py));
     for ((kind, own), error) in found.parameters.into_iter().zip(found.standard_errors) {
         let count = [own.len()];

@@ -156,7 +156,7 @@ impl RoutingSettings {
         self.0.azimuth
     }
 
-    /// How many holes a tendon moves on from disk to disk at most, or None.
+    /// Holes that a tendon moves on by from disk to disk at most, or None.
     #[getter]
     fn max_jump(&self) -> Option<usize> {
         self.0.max_jump
@@ -204,8 +204,9 @@ impl RoutingSettings {
     }
 }
 
-/// Robot, shape, displacements, holes, errors, root mean squares, optimality, iterations, evaluations, status and message.
-fn told<'py>(
+/// Robot, shape, displacements, holes, errors, root mean squares, optimality, iterations, evaluations, status and
+/// message.
+fn fields<'py>(
     py: Python<'py>,
     answer: Routed,
     settings: &design::RoutingSettings,
@@ -255,10 +256,10 @@ pub(crate) fn _routing<'py>(
     let answer = interruptible::run(py, None, |control| {
         routing_stopped_by(core, &targets, bounds.as_ref(), from, &settings, &control.stop)
     })?;
-    told(py, answer.map_err(|e| invalid(&e))?, &settings)
+    fields(py, answer.map_err(|e| invalid(&e))?, &settings)
 }
 
-/// The same of every row, on `threads`.
+/// Nearest routings of all rows, on `threads`.
 #[pyfunction]
 pub(crate) fn _routing_batch<'py>(
     py: Python<'py>,
@@ -278,5 +279,5 @@ pub(crate) fn _routing_batch<'py>(
         routing_rows(core, &rows, bounds.as_ref(), &settings, &pool, control)
     })?;
     let answers = answers.map_err(|e| invalid(&e))?.unwrap_or_default();
-    answers.into_iter().map(|answer| told(py, answer, &settings)).collect()
+    answers.into_iter().map(|answer| fields(py, answer, &settings)).collect()
 }

@@ -24,10 +24,13 @@ impl Predictor<'_> {
         if changes.is_empty() {
             return;
         }
+        // The factors of the solve serve all passes.
         let lengths = rod.robot().backbone().lengths();
         let sensitivity = rod.sensitivity(at.displacements, work);
         let marks = self.measured.marks(rod.robot());
+        // A point on a disk moves by v + ω × arm.
         let arm = |disk: usize, tool: &Pose| at.state.frames[disk].rotation * tool.translation;
+        // Forward: one pass per value.
         if jacobian.nrows() > changes.len() {
             for (column, change) in &changes {
                 let mut whole = sensitivity.no_change();
@@ -41,6 +44,7 @@ impl Predictor<'_> {
             }
             return;
         }
+        // Adjoint: one pass per measured number, with the weight on its point.
         let mut weights = vec![Vector3::zeros(); at.state.frames.len()];
         let mut moments = weights.clone();
         for (j, (disk, tool)) in marks.iter().enumerate() {

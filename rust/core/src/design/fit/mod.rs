@@ -162,6 +162,7 @@ pub fn fit(
     if control.stop.load(Ordering::Relaxed) {
         return Ok(None);
     }
+    // Estimates and their standard errors, in their units.
     let Predictor { parameters, .. } = predictor;
     let errors = standard_errors(&at.rows, parameters.len(), loss, pool);
     let errors = errors.component_mul(&parameters.units);

@@ -98,9 +98,11 @@ impl Predictor<'_> {
                     solved: false,
                 });
             }
+            // Forward solve from rest.
             let displacements = self.parameters.displacements(values, given);
             let report = model.solve(&displacements, work)?;
             let at = Solution { given, displacements: &displacements, state: model.state(work) };
+            // r = p̂ − p.
             let marks = self.measured.marks(model.robot());
             let residual = marks.iter().zip(points).flat_map(|((disk, tool), point)| {
                 let off = point - at.state.frames[*disk].transform(&tool.translation);
@@ -109,6 +111,7 @@ impl Predictor<'_> {
             let residual = DVector::from_iterator(3 * points.len(), residual);
             let finite = residual.iter().all(|r| r.is_finite());
             let solved = report.status == Status::Converged && finite;
+            // J = ∂p/∂x from the same solve, by the scaled values.
             let mut jacobian = DMatrix::zeros(0, 0);
             if derivatives && solved {
                 jacobian = DMatrix::zeros(residual.len(), self.parameters.len());
@@ -120,6 +123,7 @@ impl Predictor<'_> {
             self.control.done.fetch_add(1, Ordering::Relaxed);
             Ok(Row { residual, jacobian, solved })
         };
+        // Rows on the pool; the first that fails in their order is the error.
         let rows: Vec<_> = self.pool.install(|| {
             let rows = chosen.par_iter().with_min_len(ROWS_PER_JOB);
             rows.map_init(M::Scratch::default, solve).collect()

@@ -14,8 +14,8 @@ const BLIND: f64 = 1e-12;
 /// Share of a value in such a direction from which the data do not tell it.
 const SHARE: f64 = 1e-4;
 
-/// Standard errors of the scaled values; infinite where the data do not tell them. Rows are independent, points of a row
-/// are not: every row's residual is that of a fit without it, by its leverage.
+/// Standard errors of the scaled values; infinite where the data do not tell them. Rows are independent, points of a
+/// row are not: every row's residual is that of a fit without it, by its leverage.
 pub(super) fn standard_errors(
     rows: &[Row],
     size: usize,
@@ -58,6 +58,7 @@ pub(super) fn standard_errors(
         });
         moved.collect()
     });
+    // Root of the diagonal of H⁻¹ (Σ gᵢ gᵢᵀ) H⁻¹.
     DVector::from_fn(size, |a, _| {
         let variance: f64 = moved.iter().map(|own| own[a] * own[a]).sum();
         if blind[a] { f64::INFINITY } else { variance.sqrt() }
