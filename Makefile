@@ -1,9 +1,18 @@
-# make demo   builds, installs into .venv, solves the bundled robots, writes pictures to demo/
-# make test   everything that CI runs
-# make bench  criterion benches and side-by-side runs against other tools
+# make demo    builds, installs into .venv, solves the bundled robots, writes pictures to demo/
+# make develop an editable build with every extra into .venv: again after a change in Rust, which takes seconds
+# make quick   Rust and Python tests without the slow ones, on that build: under two minutes when it is warm
+# make test    everything that CI runs
+# make soak    the long statistics that `make test` leaves out, for half an hour
+# make bench   criterion benches and side-by-side runs against other tools
 # make figures remakes the papers' figures into examples/figures/
-# make house  counts comments, words and arrows of the code
-# make docs   builds the guide into site/
+# make docs    builds the guide into site/
+#
+# Hooks before a commit (formats, clippy, ruff, mypy; all of this machine, nothing is fetched), after `make develop`:
+# .venv/bin/pip install pre-commit && .venv/bin/pre-commit install
+#
+# Slow tests, which `make quick` skips, are marked where they stand: in Python by @pytest.mark.slow, in Rust by a module
+# `slow` around them. So `cargo test` and `pytest` alone run all, and no list of names and no feature (which would
+# compile everything twice) stands elsewhere. Marked is what takes more than a second of one core.
 
 PYTHON ?= python3
 VENV := .venv
@@ -16,9 +25,14 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # Where cargo puts what it makes.
 TARGET := $(or $(CARGO_TARGET_DIR),target)
+# Where the sdist is unpacked, always at the same place: cargo knows it again.
+SDIST := $(abspath $(TARGET))/sdist
 MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-.PHONY: help demo test bench house figures docs guide tools rust-checks rust-tests package python-checks python-tests runs clean
+EXTRAS := plot,mesh,sobol,parquet
+
+.PHONY: help demo develop quick test soak bench house figures docs guide tools rust-checks rust-tests package python-checks \
+	python-tests runs clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -43,13 +57,27 @@ $(VENV)/created: | tools
 	@touch $@
 
 $(VENV)/installed: $(VENV)/created $(SOURCES) | tools
-	$(BIN)/pip install --quiet --force-reinstall --no-deps .
-	$(BIN)/pip install --quiet '.[plot,mesh,sobol,parquet]'
+	$(BIN)/pip install --quiet '.[$(EXTRAS)]'
+	@rm -f $(VENV)/editable
 	@touch $@
 
-$(VENV)/developed: $(VENV)/created pyproject.toml
+# What the checks need beside tdcr itself.
+$(VENV)/equipped: $(VENV)/created pyproject.toml
 	$(BIN)/pip install --quiet 'maturin>=1.14,<2' --group test --group peers --group docs
 	@touch $@
+
+# The profile of the tests, whose compiled core it shares. Once installed, only the compiled module changes.
+develop: $(VENV)/equipped
+	$(BIN)/maturin develop --locked --profile test $(if $(wildcard $(VENV)/editable),--skip-install,--extras $(EXTRAS))
+	@rm -f $(VENV)/installed
+	@touch $(VENV)/editable
+
+quick: develop
+	cargo test --locked -- --skip ::slow::
+	$(BIN)/pytest -m "not slow and not wheel"
+
+soak:
+	cargo test --locked --release -- --ignored
 
 rust-checks: tools
 	cargo fmt --all --check
@@ -58,17 +86,24 @@ rust-checks: tools
 
 rust-tests: tools
 	cargo test --locked
-	cargo bench --locked -- --test
+	cargo test --locked --benches
 
-# The wheel that the Python tests use, and a wheel from the sdist, which must hold all it needs.
-package: $(VENV)/developed
-	rm -rf dist
-	$(BIN)/maturin build --release --locked --sdist --out dist
-	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist/from-sdist dist/tdcr-*.tar.gz
-	ls dist/*-abi3-*.whl dist/from-sdist/*-abi3-*.whl
-	wheel=$$(ls $(CURDIR)/dist/*.whl); \
+# The sdist, and the wheel that pip makes of it, which the Python tests use: so it holds all it needs. Files that are as
+# they were keep their time, so that cargo compiles no more than what changed.
+package: $(VENV)/equipped
+	rm -rf dist $(SDIST)/new
+	$(BIN)/maturin sdist --out dist
+	mkdir -p $(SDIST)/new
+	tar xmzf dist/tdcr-*.tar.gz --strip-components 1 -C $(SDIST)/new
+	cd $(SDIST)/new && find . -type f | while read file; do \
+		if cmp -s $$file ../tdcr/$$file; then touch -r ../tdcr/$$file $$file; fi; done
+	rm -rf $(SDIST)/tdcr && mv $(SDIST)/new $(SDIST)/tdcr
+	CARGO_TARGET_DIR=$(abspath $(TARGET)) MATURIN_PEP517_ARGS=--locked \
+		$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist $(SDIST)/tdcr
+	wheel=$$(ls $(CURDIR)/dist/*-abi3-*.whl); \
 	$(BIN)/pip install --quiet --force-reinstall --no-deps "$$wheel"; \
-	$(BIN)/pip install --quiet "tdcr[plot,mesh,sobol,parquet] @ file://$$wheel"
+	$(BIN)/pip install --quiet "tdcr[$(EXTRAS)] @ file://$$wheel"
+	@rm -f $(VENV)/editable
 	@touch $(VENV)/installed
 
 python-checks: package
@@ -96,7 +131,7 @@ figures: $(VENV)/installed
 	for script in examples/*.py; do $(BIN)/python $$script --output examples/figures || exit 1; done
 
 # Every link, anchor, formula and docstring must hold: a warning is an error.
-docs: $(VENV)/installed $(VENV)/developed
+docs: $(VENV)/installed $(VENV)/equipped
 	$(MKDOCS)
 
 guide: package
@@ -106,7 +141,7 @@ guide: package
 # works, and its figures are rough.
 bench: SHELL := /bin/bash
 bench: .SHELLFLAGS := -o pipefail -ec
-bench: $(VENV)/installed $(VENV)/developed
+bench: $(VENV)/installed $(VENV)/equipped
 	rm -rf $(TARGET)/bench && mkdir -p $(TARGET)/bench && touch $(TARGET)/bench/started
 	cargo bench --locked -- $(if $(QUICK),--warm-up-time 0.3 --measurement-time 1 --noplot)
 	$(BIN)/python benches/python_calls.py | tee $(TARGET)/bench/python_calls.txt

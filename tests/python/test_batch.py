@@ -5,7 +5,7 @@ import pickle
 import subprocess
 import sys
 import textwrap
-import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -159,17 +159,21 @@ def test_progress_is_told_up_to_the_end():
 
 
 def test_an_exception_from_progress_stops_the_batch():
-    big = np.tile(rows(1000), (400, 1))
+    asked = []
+    far = tdcr.SignedDistance(lambda x: asked.append(x) or float(x[0]) + 1.0)
+    robot = tdcr.Robot(tdcr.Backbone(0.2, 8), [tdcr.Tendon(0.0, 0.01)])
+    solve = partial(tdcr.forward_batch, robot, obstacles=far, threads=1)
+    solve([[-0.002]])
+    of_one = len(asked)
 
     def refuse(done):
+        asked.clear()
         raise RuntimeError("enough")
 
-    begin = time.perf_counter()
     with pytest.raises(RuntimeError, match="enough"):
-        solve(big, threads=1, progress=refuse)
-    whole = time.perf_counter()
-    solve(big, threads=1)
-    assert whole - begin < time.perf_counter() - whole
+        solve(np.full((100_000, 1), -0.002), progress=refuse)
+    # The row that was at work is the last.
+    assert len(asked) <= 2 * of_one
 
 
 def test_progress_bar_goes_to_stderr():
@@ -232,5 +236,7 @@ def test_batches_work_after_a_fork():
         _, status = os.waitpid(child, 0)
         sys.exit(os.waitstatus_to_exitcode(status))
     """
-    done = subprocess.run([sys.executable, "-W", "ignore", "-c", textwrap.dedent(code)], timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", textwrap.dedent(code)], timeout=300
+    )
     assert done.returncode == 0

@@ -39,7 +39,7 @@ def robot(tmp_path):
 
 def process(*arguments):
     return subprocess.run(
-        [sys.executable, "-m", "tdcr", *arguments], capture_output=True, text=True, timeout=120
+        [sys.executable, "-m", "tdcr", *arguments], capture_output=True, text=True, timeout=300
     )
 
 

@@ -9,11 +9,11 @@ import signal
 import struct
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 from command_line import points, run, save_arm
+from interrupts import interrupts, started
 
 import tdcr
 
@@ -24,14 +24,16 @@ def robot(tmp_path, monkeypatch):
 
 
 GRID = ["--ranges", "-10:0 -5 free", "--unit", "mm", "--samples", "50", "--sampling", "grid"]
+# What runs when all is read, so long that it never ends, and its command's arguments.
 LONG = {
-    "workspace": ["--ranges", "-0.01:0 free free", "--samples", "3000000", "--sampling", "random",
-                  "--output", "w.npz"],
-    "track": ["path.csv", "--output", "t.npz"],
-    "plot": ["--pull", "-0.01 -0.004 free", "--animate", "p.gif", "--frames", "500"],
-    "fit": ["bench.csv", "--unit", "mm", "--pull-sign", "negative", "--parameters",
-            "gain,base,radius,azimuth", "-o", "f.toml"],
-    "design routing": ["bend.csv", "-o", "r.toml", "--curve"],
+    "workspace": ("tdcr.workspace", ["--ranges", "-0.01:0 free free", "--samples", "3000000",
+                                     "--sampling", "random", "--output", "w.npz"]),
+    "track": ("tdcr.track", ["path.csv", "--output", "t.npz"]),
+    "plot": ("PillowWriter.grab_frame", ["--pull", "-0.01 -0.004 free", "--animate", "p.gif",
+                              "--frames", "500"]),
+    "fit": ("design.fit", ["bench.csv", "--unit", "mm", "--pull-sign", "negative", "--parameters",
+                           "gain,base,radius,azimuth", "-o", "f.toml"]),
+    "design routing": ("design.routing", ["bend.csv", "-o", "r.toml", "--curve"]),
 }  # fmt: skip
 
 
@@ -47,20 +49,20 @@ def test_interrupting_ends_with_130_and_one_line(command, robot, tmp_path):
     noise = np.random.default_rng(0).normal([-5, 0, 0, 30, 30, 180], 4, (6000, 6))
     rows = [",".join(map(str, row)) for row in noise.tolist()]
     (tmp_path / "bench.csv").write_text("\n".join(["d0,d1,d2,x,y,z", *rows]))
-    # A shell's background job starts with SIGINT ignored.
-    code = (
-        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from tdcr._cli import main; print('ready', flush=True); sys.exit(main(sys.argv[1:]))"
+    work, arguments = LONG[command]
+    code = "\n".join(
+        [
+            "import sys, tdcr",
+            "from matplotlib.animation import PillowWriter",
+            "from tdcr import design",
+            "from tdcr._cli import main",
+            interrupts(f"within(frame, {work})"),
+            "sys.exit(main(sys.argv[1:]))",
+        ]
     )
     before = set(tmp_path.iterdir())
-    arguments = [sys.executable, "-c", code, *command.split(), robot, *LONG[command]]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(arguments, **pipes) as process:
-        assert process.stdout.readline() == "ready\n"
-        time.sleep(1.0)
-        assert process.poll() is None
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=30)
+    with started(code, *command.split(), robot, *arguments) as process:
+        out, err = process.communicate()
     assert (process.returncode, out, err) == (130, "", "tdcr: interrupted\n")
     assert set(tmp_path.iterdir()) == before
 
@@ -68,11 +70,11 @@ def test_interrupting_ends_with_130_and_one_line(command, robot, tmp_path):
 def test_progress_is_drawn_on_a_terminal_alone(robot, tmp_path):
     pty = pytest.importorskip("pty")
     command = [sys.executable, "-m", "tdcr", "workspace", robot, *GRID]
-    quiet = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    quiet = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
     assert quiet.stderr == ""
     terminal, ours = pty.openpty()
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=ours) as process:
-        out, _ = process.communicate(timeout=120)
+        out, _ = process.communicate(timeout=300)
     os.close(ours)
     drawn = os.read(terminal, 100_000).decode()
     os.close(terminal)
@@ -105,7 +107,7 @@ class Terminal:
                 if not part:
                     break
                 drawn += part
-            code = process.wait(timeout=120)
+            code = process.wait(timeout=300)
         os.close(self.ours)
         return code, drawn.decode().replace("\r\n", "\n")
 

@@ -1,6 +1,5 @@
 """Constant curvature from Python: mapping, frames, robots, derivatives, errors."""
 
-import doctest
 import pickle
 
 import numpy as np
@@ -281,8 +280,3 @@ def test_many_rows_equal_single_ones_and_bad_ones_are_named():
     with pytest.raises(tdcr.InvalidInput, match="row 17000") as caught:
         cc.arc_from_displacements(given, EVEN, 0.008, 0.1)
     assert caught.value.argument == "displacements"
-
-
-def test_doctests_run():
-    assert doctest.testmod(cc).failed == 0
-    assert doctest.testmod(cc).attempted > 3

@@ -3,7 +3,6 @@
 import copy
 import pickle
 import runpy
-import time
 from pathlib import Path
 
 import numpy as np
@@ -51,14 +50,14 @@ def test_holes_that_were_forgotten_are_found(known):
     assert with_base == answer
 
 
-def test_random_holes_are_found_within_a_second():
+def test_random_holes_are_found_by_few_evaluations():
     draw = np.random.default_rng(0)
     for _ in range(10):
         holes = (draw.integers(12) + np.cumsum(draw.integers(-2, 3, 10))) % 12
         shape = routed([holes.tolist()], [-LENGTH * draw.uniform(0.02, 0.08)])
-        begin = time.perf_counter()
         answer = design.routing(blank(), shape.positions).require()
-        assert time.perf_counter() - begin < 1.0
+        # 3,168 to 6,597: in `make bench` a few hundredths of a second.
+        assert answer.evaluations < 10_000
         assert answer.holes == (tuple(holes.tolist()),)
 
 

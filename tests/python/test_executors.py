@@ -123,7 +123,7 @@ def test_a_dask_cluster_gives_the_same_rows_when_a_worker_is_killed_too():
 
         killed = sample(chunk=100, executor=client.get_executor(), progress=kill)
         # A cluster that is closed while it replaces a worker waits for half a minute.
-        client.wait_for_workers(2, timeout=60)
+        client.wait_for_workers(2, timeout=300)
     assert left == []
     assert same_rows(found, sample())
     assert same_rows(killed, sample())

@@ -1,6 +1,7 @@
 """Backbone, Tendon, Robot: what they refuse, and that they are values."""
 
 import copy
+import inspect
 import pickle
 
 import numpy as np
@@ -237,8 +238,13 @@ def test_defaults_are_those_of_the_core():
 
     for name, defaults in _rust_defaults().items():
         settings = getattr(tdcr, name)()
+        shown = inspect.signature(getattr(tdcr, name)).parameters
+        assert list(shown) == list(defaults)
         for field, value in defaults.items():
             assert getattr(settings, field) == value
+            # None stands for the default settings of another class.
+            default = shown[field].default
+            assert default == value or (default is None and "Settings" in repr(value))
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::time::Instant;
 
 use nalgebra::Matrix3;
 use rand::{RngExt, SeedableRng};
@@ -233,7 +232,7 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
 
 /// Draws, solves, checks; the share that converged.
 fn many(count: usize, every: usize) -> f64 {
-    let (mut times, mut iterations) = (Vec::new(), Vec::new());
+    let mut iterations = Vec::new();
     let mut table: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
     let (mut done, mut good, mut touching) = (0, 0_usize, 0);
     let mut ends: BTreeMap<String, usize> = BTreeMap::new();
@@ -247,9 +246,7 @@ fn many(count: usize, every: usize) -> f64 {
         let scene = drawn.case.scene(&plan);
         let model = LoadedRod::new(&drawn.case.robot, &plan, &scene).unwrap();
         let mut work = Scratch::default();
-        let begin = Instant::now();
         let report = model.solve(&drawn.pulls, &mut work).unwrap();
-        times.push(begin.elapsed().as_secs_f64() * 1e3);
         iterations.push(report.iterations as f64);
         let shape = model.result(&drawn.pulls, report, work);
         let ok = report.status == Status::Converged;
@@ -275,10 +272,8 @@ fn many(count: usize, every: usize) -> f64 {
     for (kind, [ok, all]) in &table {
         println!("  {kind}: {ok} of {all}, {:.2} %", 1e2 * *ok as f64 / *all as f64);
     }
-    for (name, values) in [("ms", &mut times), ("steps", &mut iterations)] {
-        let [half, most, max] = [0.5, 0.99, 1.0].map(|share| quantile(values, share));
-        println!("  {name}: median {half:.3}, 99 % {most:.3}, most {max:.3}");
-    }
+    let [half, most, max] = [0.5, 0.99, 1.0].map(|share| quantile(&mut iterations, share));
+    println!("  steps: median {half:.3}, 99 % {most:.3}, most {max:.3}");
     for line in &bad {
         println!("{line}");
     }

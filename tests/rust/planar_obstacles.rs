@@ -1,7 +1,6 @@
 //! The inverse by particle swarm among circles, against scans and samples that know nothing of it.
 
 use std::f64::consts::TAU;
-use std::time::Instant;
 
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -82,30 +81,26 @@ fn three_sections_among_circles() {
             if least == f64::INFINITY {
                 return None;
             }
-            let begin = Instant::now();
             let got = solve(&trunk, &circles, &goal, &settings, case);
-            let time = begin.elapsed();
             let answer = &got.inverse;
             assert_eq!(answer.status, Status::Converged, "{case} {answer:?} {least}");
             assert!(answer.error <= 1e-12 && got.clearance >= 0.0, "{case} {answer:?}");
             assert!((tip(&trunk, &answer.turns).0 - aim).norm() < 2e-12);
             assert!(sampled(&trunk, &answer.turns, &circles) > -1e-15);
-            Some((answer.energy / least - 1.0, time.as_secs_f64(), got.evaluations))
+            Some((answer.energy / least - 1.0, got.evaluations))
         })
         .collect();
     let mut above: Vec<f64> = cases.iter().map(|c| c.0).collect();
     above.sort_by(f64::total_cmp);
     let n = above.len();
-    let time = cases.iter().map(|c| c.1).sum::<f64>() / n as f64;
-    let evaluations = cases.iter().map(|c| c.2).sum::<usize>() / n;
+    let evaluations = cases.iter().map(|c| c.1).sum::<usize>() / n;
     let off = above.iter().filter(|a| **a > 1e-3).count();
     println!(
-        "{off} of {n} cases, energy over the scan's: least {:.1e}, median {:.1e}, 90 % {:.1e}, most {:.1e}; {:.1} ms, {evaluations} evaluations",
+        "{off} of {n} cases, energy over the scan's: least {:.1e}, median {:.1e}, 90 % {:.1e}, most {:.1e}; {evaluations} evaluations",
         above[0],
         above[n / 2],
         above[n * 9 / 10],
-        above[n - 1],
-        time * 1e3
+        above[n - 1]
     );
     // Most end in the lowest valley; which one it is, no swarm can know.
     assert!(off * 20 <= n && above[n - 1] < 0.2, "{off} {above:?}");

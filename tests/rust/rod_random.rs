@@ -1,7 +1,6 @@
 //! Random rods: pulls that exist are found again, any others are solved or honestly flagged.
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -25,19 +24,6 @@ fn case(number: usize) -> (ChaCha8Rng, Recipe) {
     (draw, recipe)
 }
 
-/// Times of solves.
-#[derive(Default)]
-struct Times(Vec<Duration>);
-
-impl Times {
-    fn print(&mut self, of: &str) {
-        self.0.sort();
-        let at = |share: f64| self.0[((self.0.len() - 1) as f64 * share) as usize];
-        let (median, rare) = (at(0.5), at(0.99));
-        println!("  {of}: median {median:.0?}, 99 % below {rare:.0?}, longest {:.1?}", at(1.0));
-    }
-}
-
 /// What became of the pulls that exist, within the geometric limit and beyond.
 #[derive(Default)]
 struct Round {
@@ -49,7 +35,6 @@ struct Round {
     /// Tensions under which rest leads to no shape.
     unstable: usize,
     iterations: usize,
-    times: Times,
 }
 
 impl Round {
@@ -71,9 +56,7 @@ impl Round {
         let displacements: Vec<f64> = lengths
             .map(|((length, rest), tension)| if *tension > 0.0 { length - rest } else { FREE })
             .collect();
-        let start = Instant::now();
         let report = rod.solve(&displacements, &mut work).unwrap();
-        self.times.0.push(start.elapsed());
         self.iterations += report.iterations;
         self.cases[class] += 1;
         let pairs = rod.state(&work).frames.iter().zip(&wanted);
@@ -104,7 +87,6 @@ impl Round {
         }
         println!("  others: {:?}; off by {:.1e} of the length", self.outcomes, self.off);
         println!("  Newton steps: {:.2}", self.iterations as f64 / count as f64);
-        self.times.print("time");
     }
 }
 
@@ -112,7 +94,6 @@ impl Round {
 #[derive(Default)]
 struct Arbitrary {
     outcomes: BTreeMap<&'static str, usize>,
-    times: Times,
 }
 
 impl Arbitrary {
@@ -128,9 +109,7 @@ impl Arbitrary {
             _ => rest * draw.random_range(-0.2..0.05),
         };
         let displacements: Vec<f64> = rod.rest_lengths().iter().map(&mut displacement).collect();
-        let start = Instant::now();
         let report = rod.solve(&displacements, &mut work).unwrap();
-        self.times.0.push(start.elapsed());
         *self.outcomes.entry(report.status.as_str()).or_default() += 1;
         let message = rod.message(&displacements, &work);
         let state = rod.state(&work);
@@ -174,7 +153,6 @@ fn run(count: usize) -> (Round, Arbitrary) {
     }
     round.print();
     println!("arbitrary displacements: {:?}", arbitrary.outcomes);
-    arbitrary.times.print("time");
     (round, arbitrary)
 }
 

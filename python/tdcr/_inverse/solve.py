@@ -111,7 +111,7 @@ def inverse(
     >>> pulled = tdcr.forward(robot, [-0.003, float("inf"), float("inf")])
     >>> answer = tdcr.inverse(robot, pulled.positions[-1])
     >>> answer.status, (answer.displacements * 1e3).round(6).tolist()
-    (<Status.converged: 'converged'>, [-3.0, 1.495313, 1.495313])
+    (<Status.converged: 'converged'>, [-3.0, 1.491244, 1.491244])
     """
     search = InverseSettings() if search is None else search
     bounds = _bounds(bounds)

@@ -40,11 +40,11 @@ class Fit(Value):
     """Values by name: "offset" (K,) [m], "gain" (K,), "radius" (K,) [m], "azimuth" (K,) [rad],
     "stiffness" (K,) [N], "poisson_ratio" (1,), "rest" (2,) [1/m], "base" (6,) [m, rad]."""
     standard_errors: dict[str, Array]
-    """Of each value, by the sandwich estimate; inf where the data do not tell it."""
+    """Standard error of each value, by the sandwich estimate; inf where the data do not tell it."""
     residuals: Array
     """Measured minus predicted positions, (rows, points, 3) [m]."""
     residuals_before: Array
-    """The same with the robot as it was given."""
+    """Measured minus predicted positions of the robot as it was given."""
     rows: NDArray[np.int64]
     """Indices of the kept rows in the measurements."""
     validation: NDArray[np.bool_]
@@ -57,20 +57,20 @@ class Fit(Value):
     status: Status
     """converged, or iteration_limit."""
     message: str
-    """Whether steps still fell; how many forward solves failed; whether the root mean square
-    distance of the points fitted to is more than 10 times their median, which outliers make, or
-    more than 5 % of the robot's length: then the model is not of these measurements. Empty if none
-    of these."""
+    """Message: whether steps still fell; how many forward solves failed; whether the root mean
+    square distance of the points fitted to is more than 10 times their median, which outliers make,
+    or more than 5 % of the robot's length: then the model is not of these measurements. Empty if
+    none of these."""
     iterations: int
     """Levenberg-Marquardt steps."""
     seed: int
-    """Of the split."""
+    """Seed of the split."""
 
     _hashed: ClassVar[tuple[str, ...]] = ("robot", "residuals", "seed")
 
     @property
     def ok(self) -> bool:
-        """Whether it converged."""
+        """True where it converged."""
         return self.status is Status.converged
 
     def require(self) -> Fit:
@@ -256,7 +256,7 @@ def fit(
     TypeError
         A value of another type.
     """
-    displacements, measurements = _paired(displacements, measurements)
+    displacements, measurements = _pair(displacements, measurements)
     names, measured = checked(robot, displacements, measurements, parameters, model, validation)
     if not isinstance(robust, bool):
         raise TypeError(f"robust: expected a bool, got {type(robust).__name__}")
@@ -295,7 +295,7 @@ def fit(
     )
 
 
-def _paired(
+def _pair(
     displacements: ArrayLike | None, measurements: ArrayLike | Measurements
 ) -> tuple[ArrayLike, ArrayLike]:
     """Give displacements and positions, of which measurements have both."""

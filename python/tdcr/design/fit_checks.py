@@ -1,4 +1,4 @@
-"""What a fit is given, and what it says of how far it stays off."""
+"""Checks of what a fit is given, and of what it leaves."""
 
 from __future__ import annotations
 

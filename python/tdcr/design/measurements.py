@@ -34,7 +34,7 @@ class Measurements(Value):
     displacements: NDArray[np.float64]
     """(B, K) [m]: negative pulls, `inf` is free."""
     positions: NDArray[np.float64]
-    """Of one point, (B, 3), or of several, (B, points, 3) [m]."""
+    """Positions of one point, (B, 3), or of several, (B, points, 3) [m]."""
     lines: NDArray[np.int64]
     """Line of the file that each row is on, from 1, (B,)."""
     dropped: int

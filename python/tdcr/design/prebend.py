@@ -45,8 +45,9 @@ class Prebend(Value):
     the nearest robot that was found, or obstacles stand in the way; others: the rod does not follow
     the displacements."""
     message: str
-    """What stood in the way; when it converged, empty but for disks that `smoothness` keeps from
-    their places, obstacles that the designed robot rests in and what the solve among them says."""
+    """Message: what stood in the way; when it converged, empty but for disks that `smoothness`
+    keeps from their places, obstacles that the designed robot rests in and what the solve among
+    them says."""
     target_positions: Array
     """Wanted places of disks 1 to n, (n, 3), world frame [m]."""
     settings: PrebendSettings
@@ -58,7 +59,7 @@ class Prebend(Value):
 
     @property
     def ok(self) -> bool:
-        """Whether it converged."""
+        """True where it converged."""
         return self.status is Status.converged
 
     def require(self) -> Prebend:

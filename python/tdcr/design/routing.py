@@ -43,8 +43,8 @@ class Routing(Value):
     rms: float
     """Root mean square of the distances of disks 1 to n [m]: what is least."""
     relaxed_rms: float
-    """The same of the nearest routing of any azimuth that descents from this one and from simple
-    ones led to [m]: a local minimum, no bound. With `holes=None`, `rms` itself."""
+    """Root mean square of the nearest routing of any azimuth that descents from this one and from
+    simple ones led to [m]: a local minimum, no bound. With `holes=None`, `rms` itself."""
     optimality: str
     """reached: every disk is in its place, nothing is nearer; exhaustive: all routings of the one
     tendon were looked at over a row of tensions, between which one may be missed; searched: the
@@ -57,7 +57,7 @@ class Routing(Value):
     """converged: every disk is in its place; unreachable: the nearest that was found; others: the
     rod does not follow the displacements."""
     message: str
-    """What stood in the way; empty when it converged."""
+    """Message: what stood in the way; empty when it converged."""
     target_positions: Array
     """Wanted places of disks 1 to n, (n, 3), world frame [m]."""
     settings: RoutingSettings
@@ -68,12 +68,12 @@ class Routing(Value):
 
     @property
     def gap(self) -> float:
-        """How much nearer any azimuth would come, by root mean square, as far as known [m]."""
+        """Root mean square by which any azimuth would come nearer, as far as known [m]."""
         return self.rms - self.relaxed_rms
 
     @property
     def ok(self) -> bool:
-        """Whether it converged."""
+        """True where it converged."""
         return self.status is Status.converged
 
     def require(self) -> Routing:
@@ -138,7 +138,7 @@ def routing(
     KeyboardInterrupt
         On Ctrl-C, within about 0.1 s.
     """
-    settings = _checked(robot, settings)
+    settings = _check_settings(robot, settings)
     pairs = _pairs(robot, bounds)
     before = None
     if start is not None:
@@ -188,7 +188,7 @@ def routing_batch(
     KeyboardInterrupt
         On Ctrl-C, within about 0.1 s.
     """
-    settings = _checked(robot, settings)
+    settings = _check_settings(robot, settings)
     pairs = _pairs(robot, bounds)
     rows = _rows(robot, target_positions, settings.rod.subsegment)
     with told(progress, "routings", len(rows)) as tell:
@@ -198,7 +198,7 @@ def routing_batch(
     ]
 
 
-def _checked(robot: Robot, settings: RoutingSettings | None) -> RoutingSettings:
+def _check_settings(robot: Robot, settings: RoutingSettings | None) -> RoutingSettings:
     settings = RoutingSettings() if settings is None else settings
     for name, value, kind in (("robot", robot, Robot), ("settings", settings, RoutingSettings)):
         if not isinstance(value, kind):

@@ -30,9 +30,9 @@ mod _core {
     #[pymodule_export]
     use crate::design::fit::_fit;
     #[pymodule_export]
-    use crate::design::prebend::{_points_on_curve, _prebend, PrebendSettings};
+    use crate::design::prebend::{_points_on_curve, _prebend};
     #[pymodule_export]
-    use crate::design::routing::{_routing, _routing_batch, RoutingSettings};
+    use crate::design::routing::{_routing, _routing_batch};
     #[pymodule_export]
     use crate::forward::batch::{_fields, _forward_batch};
     #[pymodule_export]
@@ -40,7 +40,7 @@ mod _core {
     #[pymodule_export]
     use crate::forward::jacobian::jacobian;
     #[pymodule_export]
-    use crate::forward::rod::{_chained_shape, RodSettings};
+    use crate::forward::rod::_chained_shape;
     #[pymodule_export]
     use crate::forward::sensitivity::{Sensitivity, sensitivity};
     #[pymodule_export]
@@ -85,13 +85,23 @@ mod _core {
     #[pymodule_export]
     use crate::scene::signed_distance::SignedDistance;
     #[pymodule_export]
+    use crate::settings::_rust_defaults;
+    #[pymodule_export]
     use crate::settings::bounds::Bounds;
+    #[pymodule_export]
+    use crate::settings::constant_curvature::ConstantCurvatureSettings;
+    #[pymodule_export]
+    use crate::settings::inverse::InverseSettings;
+    #[pymodule_export]
+    use crate::settings::linkage::LinkageSettings;
+    #[pymodule_export]
+    use crate::settings::prebend::PrebendSettings;
     #[pymodule_export]
     use crate::settings::pso::PsoSettings;
     #[pymodule_export]
-    use crate::settings::{
-        _rust_defaults, ConstantCurvatureSettings, InverseSettings, LinkageSettings,
-    };
+    use crate::settings::rod::RodSettings;
+    #[pymodule_export]
+    use crate::settings::routing::RoutingSettings;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -6,10 +6,12 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyTuple, PyType};
+use pyo3::types::{PyTuple, PyType};
 
 use tdcr::lie::Pose;
 use tdcr::{InvalidInput, Status};
+
+use crate::convert::python_side::{INVALID_INPUT, STATUS, numpy};
 
 /// A core error as `tdcr.errors.InvalidInput`.
 pub(crate) fn invalid(error: &InvalidInput) -> PyErr {
@@ -21,14 +23,14 @@ pub(crate) fn invalid(error: &InvalidInput) -> PyErr {
 
 fn invalid_class(py: Python<'_>) -> PyResult<Bound<'_, PyType>> {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-    Ok(CLASS.import(py, "tdcr.errors", "InvalidInput")?.clone())
+    Ok(CLASS.import(py, INVALID_INPUT.module, INVALID_INPUT.name)?.clone())
 }
 
 /// A status as `tdcr.Status`.
 pub(crate) fn status(py: Python<'_>, status: Status) -> PyResult<Bound<'_, PyAny>> {
     static MEMBERS: PyOnceLock<[Py<PyAny>; Status::ALL.len()]> = PyOnceLock::new();
     let members = MEMBERS.get_or_try_init(py, || {
-        let class = py.import("tdcr._base.status")?.getattr("Status")?;
+        let class = STATUS.get(py)?;
         let mut members = Vec::with_capacity(Status::ALL.len());
         for status in Status::ALL {
             members.push(class.call1((status.as_str(),))?.unbind());
@@ -79,7 +81,7 @@ pub(crate) fn float_array<'py>(
         return Ok(array);
     }
     let py = value.py();
-    let numpy = py.import("numpy")?;
+    let numpy = numpy(py)?;
     let array = numpy.call_method1("asarray", (value,)).map_err(|error| {
         let expected = "a rectangular array of numbers";
         let got = error.value(py).to_string();
@@ -203,15 +205,6 @@ where
         return one.into_bound_py_any(py);
     }
     Ok(PyTuple::new(py, values.iter().copied())?.into_any())
-}
-
-/// A call of a class with keywords, as its repr.
-pub(crate) fn called(class: &str, keywords: &Bound<'_, PyDict>) -> PyResult<String> {
-    let mut given = Vec::new();
-    for (name, value) in keywords {
-        given.push(format!("{name}={}", value.repr()?));
-    }
-    Ok(format!("{class}({})", given.join(", ")))
 }
 
 /// A list for a repr: whole when short, else its ends.

@@ -10,9 +10,8 @@ use tdcr::linkage::LinkageSettings;
 use tdcr::rod::RodSettings;
 
 use crate::convert::arrays::{invalid, type_name};
-use crate::forward::rod;
 use crate::scene::Surroundings;
-use crate::settings;
+use crate::settings::{constant_curvature, linkage, rod};
 
 /// A model by name with its settings.
 #[derive(Clone, Copy, PartialEq)]
@@ -36,9 +35,9 @@ impl Choice {
     pub(crate) fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         match self {
             Self::Rod(own) => rod::RodSettings(*own).into_bound_py_any(py),
-            Self::Linkage(own) => settings::LinkageSettings(*own).into_bound_py_any(py),
+            Self::Linkage(own) => linkage::LinkageSettings(*own).into_bound_py_any(py),
             Self::ConstantCurvature(own) => {
-                settings::ConstantCurvatureSettings(*own).into_bound_py_any(py)
+                constant_curvature::ConstantCurvatureSettings(*own).into_bound_py_any(py)
             }
         }
     }
@@ -51,11 +50,12 @@ impl Choice {
                 Ok(Self::Rod(given.map_or_else(Default::default, |s| s.get().0)))
             }
             "linkage" => {
-                let given = own_settings::<settings::LinkageSettings>(model, settings)?;
+                let given = own_settings::<linkage::LinkageSettings>(model, settings)?;
                 Ok(Self::Linkage(given.map_or_else(Default::default, |s| s.get().0)))
             }
             "constant_curvature" => {
-                let given = own_settings::<settings::ConstantCurvatureSettings>(model, settings)?;
+                let given =
+                    own_settings::<constant_curvature::ConstantCurvatureSettings>(model, settings)?;
                 Ok(Self::ConstantCurvature(given.map_or_else(Default::default, |s| s.get().0)))
             }
             _ => {
@@ -78,8 +78,8 @@ fn own_settings<'a, 'py, T: PyTypeInfo>(
         let expected = T::type_object(settings.py()).name().map(|name| name.to_string());
         let (expected, got) = (expected.unwrap_or_default(), type_name(settings));
         let known = settings.is_instance_of::<rod::RodSettings>()
-            || settings.is_instance_of::<settings::LinkageSettings>()
-            || settings.is_instance_of::<settings::ConstantCurvatureSettings>();
+            || settings.is_instance_of::<linkage::LinkageSettings>()
+            || settings.is_instance_of::<constant_curvature::ConstantCurvatureSettings>();
         if known {
             let expected = format!("{expected} for model \"{model}\"");
             return invalid(&InvalidInput::new("settings", expected, got));

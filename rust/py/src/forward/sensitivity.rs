@@ -16,6 +16,7 @@ use crate::convert::arguments::number;
 use crate::convert::arrays::{
     float_array, frozen, frozen_points, invalid, shape_text, type_name, values, wrong_shape,
 };
+use crate::convert::python_side;
 use crate::forward::jacobian::frozen_columns;
 use crate::forward::model_choice::Choice;
 use crate::forward::rod;
@@ -199,7 +200,7 @@ impl Sensitivity {
             frozen_points(py, told.velocities.into_iter())?,
             frozen_points(py, told.spins.into_iter())?,
         );
-        py.import("tdcr._forward.sensitivity")?.getattr("Variation")?.call1(fields)
+        python_side::VARIATION.get(py)?.call1(fields)
     }
 
     /// Gradient of weighted positions and rotations of the disks by everything at once: of
@@ -247,7 +248,7 @@ impl Sensitivity {
             frozen(py, by.lengths, &[count])?,
             by.poisson_ratio,
         );
-        py.import("tdcr._forward.sensitivity")?.getattr("Gradient")?.call1(fields)
+        python_side::GRADIENT.get(py)?.call1(fields)
     }
 
     fn __hash__(&self) -> u64 {
@@ -266,7 +267,7 @@ impl Sensitivity {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let rebuild = py.import("tdcr._core")?.getattr("sensitivity")?;
+        let rebuild = python_side::REBUILD_SENSITIVITY.get(py)?;
         Ok((rebuild, PyTuple::new(py, [self.shape(py)])?))
     }
 }

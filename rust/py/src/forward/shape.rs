@@ -10,6 +10,7 @@ use tdcr::lie::Pose;
 use tdcr::model::State;
 
 use crate::convert::arrays::{Lazy, frozen, frozen_frames, frozen_points, status};
+use crate::convert::python_side;
 use crate::forward::model_choice::Choice;
 use crate::robot::Robot;
 use crate::scene::Surroundings;
@@ -78,7 +79,7 @@ impl Shape {
         let report = || {
             let shape = slf.get();
             let message = format!("{}: {}", shape.core.report.status, shape.core.message);
-            slf.py().import("tdcr.errors")?.getattr("NotConverged")?.call1((message, slf))
+            python_side::NOT_CONVERGED.get(slf.py())?.call1((message, slf))
         };
         report().map_or_else(|error| error, PyErr::from_value)
     }
@@ -301,7 +302,7 @@ impl Shape {
     ///     The file cannot be written.
     #[pyo3(signature = (path))]
     fn save(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
-        slf.py().import("tdcr._io.save_load")?.call_method1("save", (slf, path))?;
+        python_side::SAVE.get(slf.py())?.call1((slf, path))?;
         Ok(())
     }
 
@@ -323,7 +324,7 @@ impl Shape {
         class: &Bound<'py, PyType>,
         path: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        class.py().import("tdcr._io.save_load")?.call_method1("load", (path, "Shape"))
+        python_side::LOAD.get(class.py())?.call1((path, "Shape"))
     }
 
     /// Frames in the layout of CRVisToolkit, the plotting toolkit of opencontinuumrobotics.com: the
@@ -373,7 +374,7 @@ impl Shape {
         slf: &Bound<'py, Self>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        slf.py().import("tdcr._plot.shape")?.getattr("plot_shape")?.call((slf,), options)
+        python_side::PLOT_SHAPE.get(slf.py())?.call((slf,), options)
     }
 
     /// Equal by value: robot, model, settings, displacements, surroundings and answer.
@@ -420,7 +421,7 @@ impl Shape {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let rebuild = py.import("tdcr._core")?.getattr("_shape")?;
+        let rebuild = python_side::REBUILD_SHAPE.get(py)?;
         let state = (
             self.robot.clone(),
             self.model(),

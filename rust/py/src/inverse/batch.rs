@@ -18,7 +18,7 @@ use crate::inverse::targets::many_targets;
 use crate::inverse::{Engine, Plans, one_start};
 use crate::robot::Robot;
 use crate::scene::{Surroundings, checked};
-use crate::settings::InverseSettings;
+use crate::settings::inverse::InverseSettings;
 
 /// Columns of many inverses, each alone (`chain` false) or from the answer of the one before.
 #[pyfunction]

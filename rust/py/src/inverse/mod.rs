@@ -26,8 +26,8 @@ use crate::forward::shape::Shape;
 use crate::inverse::targets::one_target;
 use crate::robot::Robot;
 use crate::scene::{self, Surroundings, Watched, checked};
-use crate::settings::InverseSettings;
 use crate::settings::bounds::Bounds;
+use crate::settings::inverse::InverseSettings;
 
 /// Steps and evaluations, of a few tenths of a microsecond each, up to which a single inverse ends soon
 /// enough to go without listening for Ctrl-C.

@@ -16,6 +16,7 @@ use tdcr::{InvalidInput, linkage};
 
 use crate::convert::arguments::{optional, text};
 use crate::convert::arrays::{Lazy, frozen, frozen_frames, invalid, matrix4, type_name};
+use crate::convert::python_side;
 use crate::robot::backbone::Backbone;
 use crate::robot::tendon::Tendon;
 
@@ -177,7 +178,7 @@ impl Robot {
         class: &Bound<'py, PyType>,
         path: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        class.py().import("tdcr._io.robot_file")?.call_method1("load_robot", (path,))
+        python_side::LOAD_ROBOT.get(class.py())?.call1((path,))
     }
 
     /// Writes a robot file (TOML or JSON by its ending) that `load` reads back exactly.
@@ -195,7 +196,7 @@ impl Robot {
     ///     The file cannot be written.
     #[pyo3(signature = (path))]
     fn save(slf: &Bound<'_, Self>, path: &Bound<'_, PyAny>) -> PyResult<()> {
-        slf.py().import("tdcr._io.robot_file")?.call_method1("save_robot", (slf, path))?;
+        python_side::SAVE_ROBOT.get(slf.py())?.call1((slf, path))?;
         Ok(())
     }
 

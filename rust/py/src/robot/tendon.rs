@@ -10,6 +10,7 @@ use tdcr::robot::{self as core, PerDisk, Routing};
 
 use crate::convert::arguments::{OneOrMany, number, optional, text, whole};
 use crate::convert::arrays::{invalid, list_text};
+use crate::convert::python_side;
 
 /// A cable that runs from the base through one hole in every disk up to the disk where it ends.
 ///
@@ -260,7 +261,7 @@ impl Tendon {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let rebuild = py.import("tdcr._core")?.getattr("_tendon")?;
+        let rebuild = python_side::REBUILD_TENDON.get(py)?;
         let (end, stiffness) = (self.end(), self.stiffness());
         let recipe = (
             self.azimuth(py)?,

@@ -11,6 +11,7 @@ use tdcr::obstacle as core;
 use crate::convert::arrays::{
     Lazy, aligned, frozen, frozen_points, invalid, type_name, vectors, wrong_shape,
 };
+use crate::convert::python_side;
 use crate::scene::obstacle::Obstacle;
 
 /// The inside of a closed surface of triangles.
@@ -48,7 +49,7 @@ pub(crate) struct Mesh {
 
 /// Rows of three whole numbers of 0 or more.
 fn triangles(value: &Bound<'_, PyAny>) -> PyResult<Vec<[usize; 3]>> {
-    let numpy = value.py().import("numpy")?;
+    let numpy = python_side::numpy(value.py())?;
     let array = numpy.call_method1("asarray", (value,)).map_err(|error| {
         let got = error.value(value.py()).to_string();
         invalid(&InvalidInput::new("faces", "a rectangular array of vertex numbers", got))
@@ -121,7 +122,7 @@ impl Mesh {
         unit: &Bound<'py, PyAny>,
         inside: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        class.py().import("tdcr._io.mesh_file")?.call_method1("load_mesh", (path, unit, inside))
+        python_side::LOAD_MESH.get(class.py())?.call1((path, unit, inside))
     }
 
     /// Vertices, shape (V, 3) [m].

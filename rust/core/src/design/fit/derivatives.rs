@@ -73,10 +73,8 @@ impl Predictor<'_> {
                         ByValue::Holes(k, hole_shift(*kind, rod.robot(), k))
                     }
                     Parameter::Stiffness => {
-                        // A tendon may be longer by its rest length times T/EA: less of that is a pull.
-                        let stiffness = rod.robot().tendons()[k].stiffness().unwrap_or(1.0);
-                        let strain = at.state.tensions[k] / stiffness;
-                        ByValue::Displacement(k, -rod.rest_lengths()[k] * strain / stiffness)
+                        let stiffness = rod.robot().tendons()[k].stiffness();
+                        ByValue::Stiffness(k, 1.0 / stiffness.unwrap_or(f64::INFINITY))
                     }
                     Parameter::PoissonRatio => ByValue::PoissonRatio,
                     Parameter::Rest => ByValue::Rest(k),
@@ -157,6 +155,7 @@ fn hole_shift(kind: Parameter, robot: &Robot, k: usize) -> Vector3<f64> {
 /// Change of a rod by a value.
 enum ByValue {
     Displacement(usize, f64),
+    Stiffness(usize, f64),
     Holes(usize, Vector3<f64>),
     PoissonRatio,
     Rest(usize),
@@ -166,6 +165,7 @@ impl ByValue {
     fn add_to(&self, change: &mut Change, lengths: &[f64]) {
         match *self {
             Self::Displacement(k, slope) => change.displacements[k] += slope,
+            Self::Stiffness(k, slope) => change.stiffness[k] += slope,
             Self::Holes(k, shift) => change.holes[k].iter_mut().for_each(|own| *own += shift),
             Self::PoissonRatio => change.poisson_ratio += 1.0,
             Self::Rest(c) => {
@@ -178,6 +178,7 @@ impl ByValue {
     fn dot(&self, gradient: &Change, lengths: &[f64]) -> f64 {
         match *self {
             Self::Displacement(k, slope) => gradient.displacements[k] * slope,
+            Self::Stiffness(k, slope) => gradient.stiffness[k] * slope,
             Self::Holes(k, shift) => gradient.holes[k].iter().sum::<Vector3<f64>>().dot(&shift),
             Self::PoissonRatio => gradient.poisson_ratio,
             Self::Rest(c) => gradient.rest.iter().zip(lengths).map(|(own, l)| own[c] * l).sum(),
@@ -199,7 +200,7 @@ mod tests {
     use crate::design::fit::parameters::Parameters;
     use crate::design::{FitModel, FitSettings, Measured, fit};
     use crate::robot::{Backbone, BackboneSpec, PerDisk, Routing, Tendon};
-    use crate::rod::RodSettings;
+    use crate::rod::{RodSettings, TendonRule};
 
     const BASE: Matrix4<f64> = Matrix4::new(
         0.0, 0.0, 1.0, 0.1, //
@@ -307,7 +308,13 @@ mod tests {
         let given = [-0.004, -0.003, -0.006, f64::INFINITY, 0.001, -0.006];
         let measured = at_origin(&robot, &given, 9);
         let kinds = [Parameter::Stiffness, Parameter::Offset];
-        compare(&robot, FitModel::Rod(RodSettings::default()), &kinds, &measured);
+        for tendons in [TendonRule::Sliding, TendonRule::Proportional] {
+            let settings = RodSettings { tendons, ..RodSettings::default() };
+            // By forward passes and by adjoint ones.
+            compare(&robot, FitModel::Rod(settings), &kinds, &measured);
+            let tips = at_origin(&robot, &given, 1);
+            compare(&robot, FitModel::Rod(settings), &kinds, &tips);
+        }
     }
 
     #[test]

@@ -124,11 +124,13 @@ impl Sensitivity<'_> {
             TendonRule::Sliding if i == 0 => {
                 whole[k] += pull * (1.0 + give);
                 out.displacements[k] += pull;
+                out.stiffness[k] -= pull * give * plan.rest_lengths[k];
             }
             TendonRule::Sliding => {}
             TendonRule::Proportional => {
                 let (length, d) = (plan.rest_lengths[k], self.at.displacements[k]);
                 weights[p] += pull * (1.0 + d / length + give);
+                out.stiffness[k] -= pull * give * plan.piece_lengths[p];
                 let share = pull * plan.piece_lengths[p] / length;
                 out.displacements[k] += share;
                 whole[k] -= share * d / length;

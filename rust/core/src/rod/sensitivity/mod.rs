@@ -33,6 +33,8 @@ pub struct Change {
     pub lengths: Vec<f64>,
     /// Of Poisson's ratio.
     pub poisson_ratio: f64,
+    /// Relative change of each tendon's stiffness EA; nothing where tendons do not stretch.
+    pub stiffness: Vec<f64>,
 }
 
 /// What a change does to the shape.
@@ -320,6 +322,7 @@ impl Sensitivity<'_> {
             holes: holes.collect(),
             lengths: vec![0.0; n],
             poisson_ratio: 0.0,
+            stiffness: vec![0.0; self.at.displacements.len()],
         }
     }
 }

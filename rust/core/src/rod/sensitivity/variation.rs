@@ -91,10 +91,14 @@ impl Sensitivity<'_> {
         let k = plan.pieces[p].tendon;
         let give = plan.compliance[k] / plan.rest_lengths[k] * self.at.tensions[p];
         match plan.settings.tendons {
-            TendonRule::Sliding => own * (1.0 + give) + change.displacements[k],
+            TendonRule::Sliding => {
+                let stretch = give * plan.rest_lengths[k];
+                own * (1.0 + give) + change.displacements[k] - stretch * change.stiffness[k]
+            }
             TendonRule::Proportional => {
                 let (length, d) = (plan.rest_lengths[k], self.at.displacements[k]);
                 let ratio = (change.displacements[k] - d * whole / length) / length;
+                let ratio = ratio - give * change.stiffness[k];
                 own * (1.0 + d / length + give) + plan.piece_lengths[p] * ratio
             }
         }
