@@ -5,6 +5,8 @@
 # make soak    the long statistics that `make test` leaves out, for half an hour
 # make bench   criterion benches and side-by-side runs against other tools
 # make figures remakes the papers' figures into examples/figures/
+# make instructions  counts the instructions of five solves, with valgrind
+# make house   counts comments, words and arrows of the code
 # make docs    builds the guide into site/
 #
 # Hooks before a commit (formats, clippy, ruff, mypy; all of this machine, nothing is fetched), after `make develop`:
@@ -31,7 +33,7 @@ MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 EXTRAS := plot,mesh,sobol,parquet
 
-.PHONY: help demo develop quick test soak bench house figures docs guide tools rust-checks rust-tests package python-checks \
+.PHONY: help demo develop quick test soak bench instructions house figures docs guide tools rust-checks rust-tests package python-checks \
 	python-tests runs clean
 
 help:
@@ -115,6 +117,10 @@ python-checks: package
 python-tests: package
 	$(BIN)/pytest
 
+# `make instructions COUNT="--write before.json"` keeps the counts, `--against before.json` compares.
+instructions:
+	$(PYTHON) benches/instructions.py $(COUNT)
+
 # Counts and arrows; `make house HOUSE="--list all"` lists the places, `--against COMMIT` compares.
 house:
 	@$(PYTHON) tests/python/house $(HOUSE)
@@ -138,12 +144,14 @@ guide: package
 	$(MKDOCS)
 
 # Keeps what is printed, and writes the guide's page of it. QUICK=1 is a short run: it proves that all
-# works, and its figures are rough.
+# works, and its figures are rough. Says which benches are slower than benches/baseline.json by over
+# 15 %, and fails there with CHECK=1.
 bench: SHELL := /bin/bash
 bench: .SHELLFLAGS := -o pipefail -ec
 bench: $(VENV)/installed $(VENV)/equipped
 	rm -rf $(TARGET)/bench && mkdir -p $(TARGET)/bench && touch $(TARGET)/bench/started
 	cargo bench --locked -- $(if $(QUICK),--warm-up-time 0.3 --measurement-time 1 --noplot)
+	$(BIN)/python benches/guard.py $(TARGET) $(if $(CHECK),--check)
 	$(BIN)/python benches/python_calls.py | tee $(TARGET)/bench/python_calls.txt
 	for script in benches/peers/*.py; do $(BIN)/python $$script $(if $(QUICK),--quick) \
 		| tee $(TARGET)/bench/$$(basename $$script .py).txt; done

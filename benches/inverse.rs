@@ -79,7 +79,7 @@ fn random_poses(count: usize, extensible: bool) -> Vec<Pose> {
 /// Solves targets one by one with a forward check of each; prints the quantiles of the times.
 fn check(name: &str, inverse: &ConstantCurvatureInverse<'_>, plan: &Plan, targets: &[Target]) {
     let model = ConstantCurvature::new(inverse.robot(), plan);
-    let (mut work, mut forward) = (inverse.workspace(), Scratch::default());
+    let (mut work, mut forward) = (inverse.scratch(), Scratch::default());
     let mut found = vec![0.0; 9];
     let mut times: Vec<f64> = Vec::new();
     for target in targets {
@@ -134,7 +134,7 @@ fn benches(c: &mut Criterion) {
             let targets: Vec<Target> = poses.iter().map(of).collect();
             let name = format!("{}/{kind}", if posed { "pose" } else { "position" });
             check(&name, &inverse, &plan, &targets);
-            let mut work = inverse.workspace();
+            let mut work = inverse.scratch();
             group.throughput(Throughput::Elements(64));
             group.bench_function(format!("{name}/64_targets"), |b| {
                 b.iter(|| {

@@ -41,7 +41,7 @@ fn check(holes: &[Hole; 2], pose: &Pose) {
         let determinant = a.x * b.y - a.y * b.x;
         let c = (p * b.y - q * a.y) / determinant;
         let s = (a.x * q - b.x * p) / determinant;
-        let exact = Pose::bent(2.0 * (0.5 * c.hypot(s)).asin(), s.atan2(c));
+        let exact = Pose::from_bend(2.0 * (0.5 * c.hypot(s)).asin(), s.atan2(c));
         assert!((pose.rotation() - exact.rotation()).amax() < 1e-13);
     }
 }

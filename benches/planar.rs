@@ -18,7 +18,7 @@ use tdcr::Status;
 use tdcr::batch::{Control, pool};
 use tdcr::planar::{
     AngleFunction, Circle, Goal, InverseSettings, SwarmInverse, SwarmSettings, SwarmSolver, Trunk,
-    TwoSections, Unknowns, WatchDecision, inverse, solve_many,
+    TwoSections, Unknowns, WatchDecision, inverse, solution_rows,
 };
 use tdcr::solve::pso::{PsoSettings, Topology};
 
@@ -68,7 +68,7 @@ fn batch(c: &mut Criterion) {
     group.throughput(Throughput::Elements(targets.len() as u64));
     for threads in [1, 2] {
         let pool = pool(Some(threads)).unwrap();
-        let many = solve_many(&two, &targets, &pool, &Control::default()).unwrap();
+        let many = solution_rows(&two, &targets, &pool, &Control::default()).unwrap();
         let mut first = 0;
         for (turns, count) in turns.iter().zip(many.counts) {
             let own = &many.turns[first..first + count];
@@ -76,7 +76,7 @@ fn batch(c: &mut Criterion) {
             first += count;
         }
         group.bench_function(format!("{threads}_threads"), |b| {
-            b.iter(|| solve_many(&two, &targets, &pool, &Control::default()));
+            b.iter(|| solution_rows(&two, &targets, &pool, &Control::default()));
         });
     }
     group.finish();

@@ -25,7 +25,7 @@ fn random_poses(extensible: bool, seed: u64) {
     let bounds = bounds(extensible);
     let settings = InverseSettings::default();
     let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings).unwrap();
-    let mut work = inverse.workspace();
+    let mut work = inverse.scratch();
     let mut u = uniform(seed);
     let (mut starts, mut solved) = (Vec::new(), 0);
     let (mut worst, mut found) = ((0.0_f64, 0.0_f64), vec![0.0; 9]);
@@ -99,7 +99,7 @@ fn least_energy(extensible: bool, seed: u64) {
     let bounds = bounds(extensible);
     let settings = InverseSettings::default();
     let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings).unwrap();
-    let mut work = inverse.workspace();
+    let mut work = inverse.scratch();
     let mut u = uniform(seed);
     let (mut worst, mut compared, mut held, mut iterations) = (0.0_f64, 0, 0, 0);
     for case in 0..400 {
@@ -172,7 +172,7 @@ fn one_segment_is_solved_at_once() {
             let settings = InverseSettings::default();
             let bounds = Bounds::default();
             let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings).unwrap();
-            let mut work = inverse.workspace();
+            let mut work = inverse.scratch();
             for case in 0..1000 {
                 let (angle, phi) = (u(0.0, 0.999 * TAU), u(-PI, PI));
                 let length = if extensible { 0.1 * u(0.6, 1.9) } else { 0.1 };
@@ -232,7 +232,7 @@ fn batches_equal_single_solves_on_any_number_of_threads() {
             assert_eq!(one.displacements, two.displacements);
             let mut place = vec![0.0; 9];
             for (i, target) in targets.iter().enumerate() {
-                let mut work = inverse.workspace();
+                let mut work = inverse.scratch();
                 let row = if starts.len() == 9 { 0 } else { i };
                 let start = starts.chunks_exact(9).nth(row);
                 let start = start.map(|own| inverse.start(own, None).unwrap());

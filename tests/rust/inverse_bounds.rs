@@ -25,7 +25,7 @@ fn solve(
     target: &Target,
 ) -> (Answer, Vec<Arc>, Vec<f64>) {
     let inverse = ConstantCurvatureInverse::new(robot, plan, bounds, settings).unwrap();
-    let mut work = inverse.workspace();
+    let mut work = inverse.scratch();
     let answer = inverse.solve(target, None, &mut work);
     let mut found = vec![0.0; robot.tendons().len()];
     inverse.write_displacements(&work, &mut found);
@@ -245,14 +245,14 @@ fn contradictory_bounds_are_infeasible() {
     pulled[..3].fill(-0.001);
     let bounds = Bounds { displacement: range(vec![-0.05; 9], pulled), ..Bounds::default() };
     let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings).unwrap();
-    let mut work = inverse.workspace();
+    let mut work = inverse.scratch();
     let first = inverse.solve(&target, None, &mut work);
     inverse.solve(&Target::Position(Vector3::new(0.0, 0.1, 0.0)), None, &mut work);
     assert_eq!(inverse.solve(&target, None, &mut work), first);
     // A start however far outside is no contradiction.
     let free = Bounds::default();
     let inverse = ConstantCurvatureInverse::new(&robot, &plan, &free, settings).unwrap();
-    let mut work = inverse.workspace();
+    let mut work = inverse.scratch();
     for far in [10.0, 1e3, 1e6] {
         let start = LENGTHS.map(|length| Arc::new(far / length, 1.0, length));
         let answer = inverse.solve(&target, Some(&start), &mut work);

@@ -150,8 +150,8 @@ fn seven_bars_meet_the_closed_form() {
         };
         let (holes, towards) = random_pair(&mut u, half);
         let beta = 2.0 * half.asin();
-        let exact = Pose::bent(beta, towards);
-        let near = Pose::bent((beta * u(0.6, 1.4)).min(2.9), towards + u(-0.6, 0.6));
+        let exact = Pose::from_bend(beta, towards);
+        let near = Pose::from_bend((beta * u(0.6, 1.4)).min(2.9), towards + u(-0.6, 0.6));
         let mut v = || Vector3::new(u(-0.3, 0.3), u(-0.3, 0.3), u(-0.3, 0.3)) * half;
         let start = Pose::new(&(near.link + v()), &(near.rotation_vector() + v()));
         let found = solve_seven_bar::<2>(&holes, &settings(), (k % 2 == 0).then_some(start));
@@ -295,7 +295,7 @@ fn one_tendon_in_space_agrees_with_the_plane() {
         let span = alike(radius, azimuth + 0.5 * PI, 0.0);
         let space = solve_seven_bar::<1>(&[alike(radius, azimuth, pull), span], &settings(), None);
         assert_eq!(space.ending, Ending::Converged);
-        let exact = Pose::bent(2.0 * half.asin(), azimuth);
+        let exact = Pose::from_bend(2.0 * half.asin(), azimuth);
         assert!((space.point.pose.rotation() - exact.rotation()).amax() < 1e-12);
         assert!((space.point.pose.link - exact.link).amax() < 1e-11);
     }

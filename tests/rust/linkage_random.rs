@@ -39,7 +39,7 @@ fn unreachable_pairs_are_infeasible() {
                 infeasible += 1;
                 assert!(found.violation > 1e-6);
                 for _ in 0..5 {
-                    let bend = Pose::bent(u(0.0, 2.8), u(-PI, PI));
+                    let bend = Pose::from_bend(u(0.0, 2.8), u(-PI, PI));
                     let again = solve_seven_bar::<2>(&holes, &settings, Some(bend));
                     missed += usize::from(again.ending == Ending::Converged);
                 }

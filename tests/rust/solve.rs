@@ -1,7 +1,7 @@
 //! Regions, nearest points and least energies, against their own definitions.
 
 use nalgebra::{DVector, Matrix4, SVector};
-use tdcr::solve::convex_region::{Disc, Region, Restoring};
+use tdcr::solve::convex_region::{Disc, Region, RestoreScratch};
 use tdcr::solve::levenberg_marquardt::{self, Ending, Problem, Purpose};
 
 use crate::inverse_common::uniform;
@@ -19,16 +19,16 @@ fn random_region(u: &mut impl FnMut(f64, f64) -> f64) -> (Region, Vec<f64>) {
         normals.push((0..size).map(|_| u(-3.0, 3.0)).collect::<Vec<f64>>());
     }
     if u(0.0, 1.0) < 0.5 {
-        region.equate(&normals[0], along(&normals[0]));
+        region.add_equation(&normals[0], along(&normals[0]));
     }
     for normal in &normals[1..] {
         // Some of them touch the point.
         let room = if u(0.0, 1.0) < 0.3 { 0.0 } else { u(0.0, 2.0) };
-        region.bound(normal, along(normal) + room);
+        region.add_bound(normal, along(normal) + room);
     }
     let mut height = vec![0.0; size];
     height[6] = -1.0;
-    region.bound(&height, -0.5);
+    region.add_bound(&height, -0.5);
     region.add_disc(Disc { first: 0, radius: 1.0, scale: None });
     region.add_disc(Disc { first: 2, radius: 1.2, scale: None });
     region.add_disc(Disc { first: 4, radius: 1.8, scale: Some(6) });
@@ -38,7 +38,7 @@ fn random_region(u: &mut impl FnMut(f64, f64) -> f64) -> (Region, Vec<f64>) {
 #[test]
 fn points_are_restored_into_regions_and_left_alone_inside() {
     let mut u = uniform(42);
-    let mut work = Restoring::default();
+    let mut work = RestoreScratch::default();
     for case in 0..5000 {
         let (region, inside) = random_region(&mut u);
         assert!(region.violation(&inside) < 1e-14);
@@ -60,13 +60,13 @@ fn points_are_restored_into_regions_and_left_alone_inside() {
 
 #[test]
 fn empty_regions_are_found_out() {
-    let mut work = Restoring::default();
+    let mut work = RestoreScratch::default();
     let mut restored = |region: &Region| region.restore(&mut [0.3, -0.2, 0.9], &mut work);
     let disc = |radius, scale| Disc { first: 0, radius, scale };
     let region = |bounds: &[([f64; 3], f64)], discs: &[Disc]| {
         let mut region = Region::new(3);
         for (normal, bound) in bounds {
-            region.bound(normal, *bound);
+            region.add_bound(normal, *bound);
         }
         for disc in discs {
             region.add_disc(*disc);
@@ -86,8 +86,8 @@ fn empty_regions_are_found_out() {
     }
     assert!(restored(&region(&[], &[disc(0.0, None)])));
     let mut contradictory = Region::new(3);
-    contradictory.equate(&[1.0, 0.0, 0.0], 1.0);
-    contradictory.equate(&[2.0, 0.0, 0.0], 2.1);
+    contradictory.add_equation(&[1.0, 0.0, 0.0], 1.0);
+    contradictory.add_equation(&[2.0, 0.0, 0.0], 2.1);
     assert!(!restored(&contradictory));
 }
 
@@ -139,11 +139,11 @@ impl Problem<3> for Curved {
         }
     }
 
-    fn squared(&mut self, z: &[f64]) -> f64 {
+    fn squared_norm(&mut self, z: &[f64]) -> f64 {
         self.residual(z).norm_squared()
     }
 
-    fn met(&self, residual: &SVector<f64, 3>) -> bool {
+    fn is_met(&self, residual: &SVector<f64, 3>) -> bool {
         residual.amax() < 1e-11
     }
 
@@ -175,10 +175,10 @@ impl Problem<3> for Curved {
 /// A disc, one that grows, and two bounds; normals of what is active at a point.
 fn small_region() -> Region {
     let mut region = Region::new(SIZE);
-    region.bound(&[0.0, 0.0, 0.0, 1.0], 1.2);
-    region.bound(&[0.0, 0.0, 0.0, -1.0], -0.4);
-    region.bound(&[1.0, 1.0, 1.0, 0.0], 0.8);
-    region.bound(&[0.0, 0.0, -1.0, 0.0], 1.0);
+    region.add_bound(&[0.0, 0.0, 0.0, 1.0], 1.2);
+    region.add_bound(&[0.0, 0.0, 0.0, -1.0], -0.4);
+    region.add_bound(&[1.0, 1.0, 1.0, 0.0], 0.8);
+    region.add_bound(&[0.0, 0.0, -1.0, 0.0], 1.0);
     region.add_disc(Disc { first: 0, radius: 0.7, scale: Some(3) });
     region.add_disc(Disc { first: 0, radius: 0.6, scale: None });
     region
@@ -230,7 +230,7 @@ fn nearest_points_and_least_energies_are_stationary() {
             }
             Ending::Met => {
                 met += 1;
-                let ending = work.lower_energy(&mut problem, &region, &mut z, 300);
+                let ending = work.minimize_energy(&mut problem, &region, &mut z, 300);
                 assert!(region.violation(&z) < 2e-13 && work.residual.amax() < 1e-11, "{case}");
                 if ending != Ending::Met {
                     limits += 1;

@@ -3,12 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tdcr::solve::bounded_program::Bounded;
+use tdcr::solve::bounded_program::BoundedProgram;
 
 #[test]
 fn answers_meet_the_conditions_of_optimality() {
     let mut draw = ChaCha8Rng::seed_from_u64(1);
-    let mut solver = Bounded::default();
+    let mut solver = BoundedProgram::default();
     let mut at_bounds = 0;
     for case in 0..2000 {
         let size = draw.random_range(1..10_usize);
@@ -42,7 +42,7 @@ fn answers_meet_the_conditions_of_optimality() {
 /// A slack tendon's distance from its bound says nothing about how exact another's slope is.
 #[test]
 fn a_variable_far_onto_its_bound_hides_no_other() {
-    let mut solver = Bounded::default();
+    let mut solver = BoundedProgram::default();
     for far in [-1.0, -1e15, -1e300] {
         assert!(solver.solve(&[1.0, 0.1, 0.1, 1.0], &[1e-3, far], &[0.0; 2], |_| false));
         assert_eq!(solver.step, [1e-3, 0.0]);
@@ -51,7 +51,7 @@ fn a_variable_far_onto_its_bound_hides_no_other() {
 
 #[test]
 fn what_is_not_a_number_is_refused() {
-    let mut solver = Bounded::default();
+    let mut solver = BoundedProgram::default();
     assert!(!solver.solve(&[f64::NAN], &[1.0], &[-1.0], |_| true));
     assert!(!solver.solve(&[-1.0], &[1.0], &[-1.0], |_| true));
     assert!(solver.solve(&[], &[], &[], |_| true));

@@ -1,7 +1,7 @@
 //! Quadratic programs against the enumeration of all active sets.
 
 use nalgebra::{DMatrix, DVector};
-use tdcr::solve::quadratic_program::{Outcome, Quadratic, Rows};
+use tdcr::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
 
 use crate::inverse_common::uniform;
 
@@ -55,7 +55,7 @@ impl Program {
         best
     }
 
-    fn solve(&self, work: &mut Quadratic) -> (Outcome, Rows) {
+    fn solve(&self, work: &mut QuadraticProgram) -> (Outcome, Rows) {
         let mut rows = Rows::default();
         for (normal, offset) in self.normals.iter().zip(&self.offsets) {
             rows.push(self.size, *offset).copy_from_slice(normal.as_slice());
@@ -123,7 +123,7 @@ fn random_program(kind: usize, u: &mut impl FnMut(f64, f64) -> f64) -> Program {
 #[test]
 fn quadratic_programs_match_the_enumeration_of_active_sets() {
     let mut u = uniform(41);
-    let mut work = Quadratic::default();
+    let mut work = QuadraticProgram::default();
     let mut counts = [[0; 2]; 6];
     for case in 0..30_000 {
         let kind = case % 6;
@@ -159,7 +159,7 @@ fn quadratic_programs_match_the_enumeration_of_active_sets() {
 #[test]
 fn nearly_singular_programs_are_solved_in_a_box() {
     let mut u = uniform(44);
-    let mut work = Quadratic::default();
+    let mut work = QuadraticProgram::default();
     for case in 0..10_000 {
         let size = 3 + case % 7;
         let jacobian = DMatrix::from_fn(1 + case % 3, size, |_, _| u(-1.0, 1.0));

@@ -5,14 +5,22 @@ use std::fmt::Display;
 use nalgebra::{Matrix3, Vector3};
 
 /// An argument that cannot be used, with what was expected and what came.
+///
+/// ```
+/// use tdcr::robot::Tendon;
+///
+/// let error = Tendon::straight(0.0, -0.01).unwrap_err();
+/// assert_eq!(error.argument, "radius");
+/// assert_eq!(error.got, "-0.01");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{argument}: expected {expected}, got {got}")]
 pub struct InvalidInput {
     /// The argument as the caller named it, for instance `tendons[2].radius`.
     pub argument: String,
-    /// What would have been accepted, with its unit.
+    /// Values that would have been accepted, with their unit.
     pub expected: String,
-    /// What came.
+    /// Value that came.
     pub got: String,
 }
 
@@ -26,7 +34,7 @@ impl InvalidInput {
         Self { argument: argument.into(), expected: expected.into(), got: got.to_string() }
     }
 
-    /// The same error seen from outside: `radius` becomes `tendons[2].radius`.
+    /// Error seen from outside: `radius` becomes `tendons[2].radius`.
     #[must_use]
     pub fn within(mut self, outer: &str) -> Self {
         self.argument = format!("{outer}.{}", self.argument);
@@ -113,7 +121,7 @@ pub(crate) fn direction(
     Ok(scaled / scaled.norm())
 }
 
-/// How far a rotation matrix may be from orthonormal: the rounding of hand-typed 1e-10 digits.
+/// Largest error of orthonormality of a rotation matrix: the rounding of hand-typed 1e-10 digits.
 const RIGID_TOLERANCE: f64 = 1e-9;
 
 /// Checks that a matrix is a rotation; gives back how far it is from orthonormal.

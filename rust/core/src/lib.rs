@@ -4,9 +4,10 @@
 //! SI (m, rad, N, Pa); frames, signs and words are those of the user guide in `docs/`.
 //!
 //! Rooms, from the bottom up: [`lie`] (rotations and rigid motions), [`solve`] (solvers that know no
-//! robots), [`robot`] (what a robot is), [`obstacle`] (what it must stay out of), [`model`] (what every
-//! forward model offers), [`linkage`] (the linkage model), [`constant_curvature`], [`rod`] (the strain-energy rod), [`planar`] (planar
-//! trunks), [`batch`] (many solves on all cores), [`inverse`] (from targets to displacements).
+//! robots), [`robot`] (backbones and tendons), [`obstacle`] (bodies to stay out of), [`model`] (the
+//! interface of forward models), [`linkage`], [`constant_curvature`] and [`rod`] (the forward models),
+//! [`batch`] (many solves on all cores), [`inverse`] (from targets to displacements), [`design`] (robots
+//! for given shapes), [`planar`] (planar trunks).
 //!
 //! ```
 //! use tdcr::linkage::{Linkage, LinkageSettings, Plan};

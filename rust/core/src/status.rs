@@ -1,13 +1,20 @@
-//! How a solve ended.
+//! Outcomes of a solve.
 
 use std::fmt;
 
 /// Outcome of a solve: data, not an error.
+///
+/// ```
+/// use tdcr::Status;
+///
+/// assert_eq!(Status::IterationLimit.as_str(), "iteration_limit");
+/// assert_eq!(Status::ALL.len(), 5);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Status {
     /// The conditions of the model hold to the stated tolerance.
     Converged,
-    /// Nothing satisfies what was asked; the message says what stands in the way.
+    /// Nothing satisfies the request; the message says why.
     Infeasible,
     /// The nearest answer is given; the target itself is out of reach.
     Unreachable,

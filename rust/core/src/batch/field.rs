@@ -4,7 +4,17 @@ use crate::error::InvalidInput;
 use crate::model::Model;
 use crate::robot::Robot;
 
-/// What can be asked of a batch beside status, residual and iterations, which it always has.
+/// Field of a batch beside status, residual and iterations, which it always has.
+///
+/// ```
+/// use tdcr::batch::Field;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// assert_eq!(Field::named("tip")?, Field::Tip);
+/// assert!(Field::named("tail").is_err());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Field {
     /// Frame of the tip disk.
@@ -71,6 +81,12 @@ impl Field {
 }
 
 /// One column of a batch: a field, or the points of one tendon.
+///
+/// ```
+/// use tdcr::batch::{Field, Key};
+///
+/// assert_eq!(Key::TendonPoints(2).field(), Field::TendonPoints);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
     /// See [`Field::Tip`].
@@ -92,7 +108,7 @@ pub enum Key {
 }
 
 impl Key {
-    /// The columns of the wanted fields, each once.
+    /// Columns of the requested fields, each once.
     pub(super) fn of(fields: &[Field], robot: &Robot) -> Vec<Self> {
         let wanted = Field::ALL.into_iter().filter(|field| fields.contains(field));
         wanted

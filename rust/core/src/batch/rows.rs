@@ -1,4 +1,4 @@
-//! Rows of displacements through any model, into one flat column per wanted field.
+//! Rows of displacements through any model, into one flat column per requested field.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -15,15 +15,45 @@ use crate::robot::Robot;
 use crate::status::Status;
 
 /// Stop flag and progress of a long call, shared with the thread that waits for it.
+///
+/// ```
+/// use std::sync::atomic::Ordering;
+/// use tdcr::batch::Control;
+///
+/// // Another thread sets the flag; a batch then returns no rows.
+/// let control = Control::default();
+/// control.stop.store(true, Ordering::Relaxed);
+/// assert_eq!(control.done.load(Ordering::Relaxed), 0);
+/// ```
 #[derive(Debug, Default)]
 pub struct Control {
-    /// Set to end the call after the rows in work, or in their midst where the model listens to it too.
+    /// Set to end the call after the current rows, or in their midst where the model reads it too.
     pub stop: Arc<AtomicBool>,
     /// Rows finished so far.
     pub done: AtomicUsize,
 }
 
 /// One field of all rows.
+///
+/// ```
+/// use tdcr::batch::{Control, Field, Key, pool, solve_rows};
+/// use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings, Plan};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let model = ConstantCurvature::new(&robot, &plan);
+/// let (threads, control) = (pool(Some(1))?, Control::default());
+/// let solved = solve_rows(&model, &[0.0; 6], 2, &[Field::Positions], &threads, &control)?;
+/// let column = &solved.unwrap_or_default().columns[0];
+/// assert_eq!((column.key, &column.shape[..]), (Key::Positions, &[11, 3][..]));
+/// assert_eq!(column.values.len(), 2 * 11 * 3);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Column {
     /// Which field.
@@ -52,18 +82,38 @@ fn too_large(rows: usize, width: usize) -> InvalidInput {
 }
 
 /// The answer of a batch: row i of every column belongs to row i of the displacements.
+///
+/// ```
+/// use tdcr::batch::{Control, Field, Key, pool, solve_rows};
+/// use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings, Plan};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let model = ConstantCurvature::new(&robot, &plan);
+/// let rows = [0.0, 0.0, 0.0, -0.004, 0.002, 0.002];
+/// let (threads, control) = (pool(Some(1))?, Control::default());
+/// let solved = solve_rows(&model, &rows, 2, &[Field::Tip], &threads, &control)?.unwrap_or_default();
+/// assert_eq!(solved.reports.len(), 2);
+/// assert_eq!(solved.values(Key::Tip).map(<[f64]>::len), Some(2 * 16));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Default)]
 pub struct Solved {
-    /// The wanted fields; the points of tendons are a column each.
+    /// Columns of the requested fields; the points of tendons are a column each.
     pub columns: Vec<Column>,
-    /// How each row ended.
+    /// Outcome of every row.
     pub reports: Vec<Report>,
-    /// Where rows touch obstacles, each with its row, in order; empty if it was not wanted.
+    /// Contacts of the rows, each with its row, in order; empty if they were not wanted.
     pub contacts: Vec<(usize, Contact)>,
 }
 
 impl Solved {
-    /// The values of a field, if it was wanted.
+    /// Values of a field, if it was requested.
     #[must_use]
     pub fn values(&self, key: Key) -> Option<&[f64]> {
         self.columns.iter().find(|column| column.key == key).map(|column| &column.values[..])
@@ -83,7 +133,7 @@ const ROWS_PER_JOB: usize = 32;
 /// number of threads.
 const ROWS_PER_CHAIN: usize = 64;
 
-/// Where the solves of a batch start.
+/// Start of the solves of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Start {
     /// Each from rest.
@@ -106,7 +156,7 @@ impl Start {
 ///
 /// # Errors
 /// `InvalidInput` naming the first row that is not usable (the numbers are checked before any row is
-/// solved), or when the wanted fields do not fit into memory.
+/// solved), or when the requested fields do not fit into memory.
 pub fn solve_rows<M: Model>(
     model: &M,
     displacements: &[f64],
@@ -118,7 +168,7 @@ pub fn solve_rows<M: Model>(
     solve_all(model, displacements, rows, fields, pool, control, Start::Cold)
 }
 
-/// As [`solve_rows`], with a row started from the answer of the row before ([`Model::resume`]) where that
+/// Batch whose rows start from the answer of the row before ([`Model::resume`]) where that
 /// converged. The first of every 64 rows starts from rest, which makes the answers independent of the number
 /// of threads.
 ///
@@ -292,7 +342,7 @@ fn write_points(place: &mut [f64], points: impl Iterator<Item = Vector3<f64>>) {
     }
 }
 
-/// The same error, saying in which row.
+/// Error with its row.
 pub(crate) fn in_row(error: InvalidInput, row: usize) -> InvalidInput {
     InvalidInput { got: format!("{} in row {row}", error.got), ..error }
 }

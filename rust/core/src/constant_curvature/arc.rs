@@ -2,11 +2,19 @@
 
 use nalgebra::{Matrix3, Matrix6x3, Vector2, Vector3};
 
-use super::unit_arc::Bent;
+use super::unit_arc::UnitArc;
 use crate::lie::Pose;
 
 /// An arc by its bending vector and its length. The bending vector `kappa * ell * (cos phi, sin phi)`
 /// is smooth where the arc is straight, where `phi` is not.
+///
+/// ```
+/// use tdcr::constant_curvature::Arc;
+///
+/// // A quarter circle of 0.1 m towards azimuth 0 ends pointing along x.
+/// let arc = Arc::new(std::f64::consts::FRAC_PI_2 / 0.1, 0.0, 0.1);
+/// assert!((arc.frame(1.0).rotation.column(2).x - 1.0).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arc {
     /// Central angle towards azimuth 0 and towards azimuth pi/2 \[rad\].
@@ -29,7 +37,7 @@ impl Arc {
         self.bend.x.hypot(self.bend.y) / self.length
     }
 
-    /// Whether it has a length, and a bend whose square is a number: what frames and derivatives need.
+    /// True when its length and the square of its bend are finite: what frames and derivatives need.
     pub(super) fn is_finite(&self) -> bool {
         self.bend.norm_squared().is_finite() && self.length.is_finite()
     }
@@ -54,14 +62,14 @@ impl Arc {
     /// `Rz(phi) [Ry(kappa s) | p(s)] Rz(-phi)`, finite and smooth where it is straight.
     #[must_use]
     pub fn frame(&self, share: f64) -> Pose {
-        Bent::new(self.bend * share).frame(self.length * share)
+        UnitArc::new(self.bend * share).frame(self.length * share)
     }
 
     /// Velocity of the arc's end (translation, then rotation, axes of its base) by the bending vector
     /// and the length \[columns: m and rad per rad, per rad, per m\].
     #[must_use]
     pub fn derivative(&self) -> Matrix6x3<f64> {
-        Bent::new(self.bend).derivative(self.length)
+        UnitArc::new(self.bend).derivative(self.length)
     }
 
     /// Derivative of the bending vector and the length by (kappa, phi, length).

@@ -15,7 +15,7 @@ use crate::lie::Pose;
 pub struct ArcRates<'a> {
     model: &'a ConstantCurvature<'a>,
     work: &'a Scratch,
-    /// `M`, without the rows of tendons that do not count, and `M⁺`.
+    /// `M`, without the rows of tendons that are not active, and `M⁺`.
     matrix: DMatrix<f64>,
     inverse: &'a DMatrix<f64>,
     /// `u` and `z = d - M u`.
@@ -30,14 +30,14 @@ impl ConstantCurvature<'_> {
         let plan = self.plan;
         let mut matrix = plan.matrix.clone();
         let mut given = DVector::zeros(displacements.len());
-        for (k, counts) in work.counted.iter().enumerate() {
-            if *counts {
+        for (k, active) in work.active.iter().enumerate() {
+            if *active {
                 given[k] = displacements[k];
             } else {
                 matrix.row_mut(k).fill(0.0);
             }
         }
-        let inverse = plan.inverse_for(&work.counted, work.masked.as_ref());
+        let inverse = plan.inverse_for(&work.active, work.masked.as_ref());
         let unknowns = inverse * &given;
         let misfit = given - &matrix * &unknowns;
         ArcRates { model: self, work, matrix, inverse, unknowns, misfit }
@@ -45,7 +45,7 @@ impl ConstantCurvature<'_> {
 }
 
 impl ArcRates<'_> {
-    /// Rates of the arcs by the displacement of a tendon; 0 for one that does not count.
+    /// Rates of the arcs by the displacement of a tendon; 0 for one that is not active.
     #[must_use]
     pub fn by_displacement(&self, tendon: usize) -> DVector<f64> {
         self.by_unknowns(&self.inverse.column(tendon).into(), 0.0)
@@ -64,7 +64,7 @@ impl ArcRates<'_> {
             entries *= if column % width < 2 { -scaled } else { 0.0 };
         }
         for (i, segment) in plan.segments.iter().enumerate() {
-            if self.work.counted[tendon] && plan.settings.coupling.joins(path.end(), segment) {
+            if self.work.active[tendon] && plan.settings.coupling.joins(path.end(), segment) {
                 change[(tendon, width * i)] -= shift.x / plan.scale;
                 change[(tendon, width * i + 1)] -= shift.y / plan.scale;
             }

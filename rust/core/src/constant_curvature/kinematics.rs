@@ -3,7 +3,7 @@
 use nalgebra::Matrix6xX;
 
 use super::arc::Arc;
-use super::unit_arc::Bent;
+use super::unit_arc::UnitArc;
 use crate::lie::Pose;
 
 /// Frames along a chain of arcs: `points` (at least 2) evenly spaced on each, its base and its tip
@@ -31,7 +31,7 @@ pub fn frames(base: &Pose, arcs: &[Arc], points: usize, out: &mut Vec<Pose>) {
 pub fn tip_derivative(base: &Pose, tool: &Pose, arcs: &[Arc]) -> Matrix6xX<f64> {
     let mut frame = *base;
     let walk = arcs.iter().map(|arc| {
-        let bent = Bent::new(arc.bend);
+        let bent = UnitArc::new(arc.bend);
         let axes = frame.rotation;
         frame = frame.compose(&bent.frame(arc.length));
         (bent.derivative(arc.length), axes, frame.translation)

@@ -11,7 +11,19 @@ use super::arc::Arc;
 use crate::error::{InvalidInput, finite, positive};
 use crate::solve::pseudo_inverse::PseudoInverse;
 
-/// How the length of the segment is found.
+/// Source of the segment's length.
+///
+/// ```
+/// use tdcr::constant_curvature::{Length, Mapping};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mapping = Mapping::new(vec![0.0, 2.1, 4.2], vec![0.008], 0.1)?;
+/// // All tendons are 2 mm longer: the segment is too, if its length is free.
+/// let fit = mapping.fit(&[0.002; 3], Length::Free)?;
+/// assert!((fit.arc.length - 0.102).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Length {
     /// It is known \[m\]: the rest length, or that of an extended backbone.
@@ -21,6 +33,18 @@ pub enum Length {
 }
 
 /// Tendons that end at the tip of one segment, each straight.
+///
+/// ```
+/// use tdcr::constant_curvature::{Arc, Length, Mapping};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mapping = Mapping::new(vec![0.0, 2.1, 4.2], vec![0.008], 0.1)?;
+/// let arc = Arc::new(5.0, 1.0, 0.1);
+/// let fit = mapping.fit(&mapping.displacements(&arc), Length::Known(0.1))?;
+/// assert!((fit.arc.kappa() - 5.0).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Mapping {
     /// Cosine and sine of every azimuth.
@@ -32,6 +56,18 @@ pub struct Mapping {
 }
 
 /// The arc that fits the displacements best, and what it leaves.
+///
+/// ```
+/// use tdcr::constant_curvature::{Length, Mapping};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mapping = Mapping::new(vec![0.0, 2.1, 4.2], vec![0.008], 0.1)?;
+/// // No arc of known length has these displacements.
+/// let fit = mapping.fit(&[0.001; 3], Length::Known(0.1))?;
+/// assert!(fit.residual.iter().any(|off| off.abs() > 1e-4));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The arc.
@@ -104,7 +140,7 @@ impl Mapping {
     pub fn fit(&self, displacements: &[f64], length: Length) -> Result<Fit, InvalidInput> {
         let (mut pattern, mut residual) = (Pattern::default(), Vec::new());
         let arc = self.fit_row(displacements, length, &mut pattern, &mut residual)?;
-        let condition = pattern.made.map_or(1.0, |made| made.inverse.condition);
+        let condition = pattern.cached.map_or(1.0, |cached| cached.inverse.condition);
         Ok(Fit { arc, residual, condition })
     }
 
@@ -120,12 +156,12 @@ impl Mapping {
         pattern: &mut Pattern,
         residual: &mut Vec<f64>,
     ) -> Result<Arc, InvalidInput> {
-        self.count(displacements, &mut pattern.counted)?;
+        self.list_active_tendons(displacements, &mut pattern.active)?;
         let known = match length {
             Length::Known(length) => Some(positive("ell", "m", length)?),
-            Length::Free if pattern.counted.len() < 3 => {
+            Length::Free if pattern.active.len() < 3 => {
                 let expected = "a length, or at least three tendons that count";
-                let got = format!("{} tendons", pattern.counted.len());
+                let got = format!("{} tendons", pattern.active.len());
                 return Err(InvalidInput::new("ell", expected, got));
             }
             Length::Free => None,
@@ -144,14 +180,18 @@ impl Mapping {
         }
         let first = residual.len();
         residual.resize(first + self.tendons(), 0.0);
-        for &k in &pattern.counted {
+        for &k in &pattern.active {
             residual[first + k] = displacements[k] - self.displacement(k, &arc, self.rest_length);
         }
         Ok(arc)
     }
 
     /// Tendons that count: not free, and not the only, released one.
-    fn count(&self, displacements: &[f64], counted: &mut Vec<usize>) -> Result<(), InvalidInput> {
+    fn list_active_tendons(
+        &self,
+        displacements: &[f64],
+        active: &mut Vec<usize>,
+    ) -> Result<(), InvalidInput> {
         if displacements.len() != self.tendons() {
             let expected = format!("{} values, one per tendon", self.tendons());
             return Err(InvalidInput::new("displacements", expected, displacements.len()));
@@ -160,20 +200,20 @@ impl Mapping {
             let expected = "finite numbers [m], or inf for a free tendon";
             return Err(InvalidInput::new("displacements", expected, bad));
         }
-        counted.clear();
-        counted.extend((0..self.tendons()).filter(|k| displacements[*k].is_finite()));
-        if let [only] = counted[..]
+        active.clear();
+        active.extend((0..self.tendons()).filter(|k| displacements[*k].is_finite()));
+        if let [only] = active[..]
             && displacements[only] > 0.0
         {
-            counted.clear();
+            active.clear();
         }
         Ok(())
     }
 
     /// Rows of the counted tendons; unknowns are the bend times the mean radius, and the elongation.
-    fn matrix(&self, counted: &[usize], extensible: bool) -> DMatrix<f64> {
-        DMatrix::from_fn(counted.len(), if extensible { 3 } else { 2 }, |row, column| {
-            let k = counted[row];
+    fn matrix(&self, active: &[usize], extensible: bool) -> DMatrix<f64> {
+        DMatrix::from_fn(active.len(), if extensible { 3 } else { 2 }, |row, column| {
+            let k = active[row];
             let arm = self.radii[k] / self.scale;
             match column {
                 0 => -arm * self.directions[k].x,
@@ -185,15 +225,30 @@ impl Mapping {
 }
 
 /// Which tendons of a row count, and the inverse over them, kept for rows with the same ones.
+///
+/// ```
+/// use tdcr::constant_curvature::{Length, Mapping, Pattern};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mapping = Mapping::new(vec![0.0, 2.1, 4.2], vec![0.008], 0.1)?;
+/// // Rows with the same free tendons share one inverse.
+/// let (mut pattern, mut residual) = (Pattern::default(), Vec::new());
+/// for row in [[-0.002, 0.001, 0.001], [0.0, -0.001, 0.001]] {
+///     mapping.fit_row(&row, Length::Known(0.1), &mut pattern, &mut residual)?;
+/// }
+/// assert_eq!(residual.len(), 6);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Pattern {
-    counted: Vec<usize>,
-    made: Option<Made>,
+    active: Vec<usize>,
+    cached: Option<CachedInverse>,
 }
 
 #[derive(Clone, Debug)]
-struct Made {
-    counted: Vec<usize>,
+struct CachedInverse {
+    active: Vec<usize>,
     extensible: bool,
     inverse: PseudoInverse,
 }
@@ -206,23 +261,25 @@ impl Pattern {
         extensible: bool,
         right: impl Fn(usize) -> f64,
     ) -> [f64; 3] {
-        let same = |made: &Made| made.extensible == extensible && made.counted == self.counted;
-        let made = match self.made.take().filter(same) {
-            Some(made) => made,
-            None => Made {
-                counted: self.counted.clone(),
+        let same = |cached: &CachedInverse| {
+            cached.extensible == extensible && cached.active == self.active
+        };
+        let cached = match self.cached.take().filter(same) {
+            Some(cached) => cached,
+            None => CachedInverse {
+                active: self.active.clone(),
                 extensible,
-                inverse: PseudoInverse::new(&mapping.matrix(&self.counted, extensible)),
+                inverse: PseudoInverse::new(&mapping.matrix(&self.active, extensible)),
             },
         };
         let mut unknowns = [0.0; 3];
-        for (column, k) in made.inverse.matrix.column_iter().zip(&self.counted) {
+        for (column, k) in cached.inverse.matrix.column_iter().zip(&self.active) {
             let value = right(*k);
             for (unknown, share) in unknowns.iter_mut().zip(column.iter()) {
                 *unknown += share * value;
             }
         }
-        self.made = Some(made);
+        self.cached = Some(cached);
         unknowns
     }
 }

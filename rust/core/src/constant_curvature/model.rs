@@ -4,7 +4,7 @@ use nalgebra::{Matrix6xX, Vector2, Vector3};
 
 use super::arc::Arc;
 use super::kinematics::tip_derivative;
-use super::plan::{Coupling, Masked, Plan};
+use super::plan::{Coupling, MaskedInverse, Plan};
 use crate::error::InvalidInput;
 use crate::lie::Pose;
 use crate::model::{Model, Report, State};
@@ -12,6 +12,23 @@ use crate::robot::Robot;
 use crate::status::Status;
 
 /// Buffers of a solve.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings, Plan, Scratch};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let mut scratch = Scratch::default();
+/// ConstantCurvature::new(&robot, &plan).solve(&[-0.01, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+/// assert!((scratch.arcs()[0].kappa() - 5.0).abs() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     state: State,
@@ -19,9 +36,9 @@ pub struct Scratch {
     pub(super) arcs: Vec<Arc>,
     /// Displacement given minus displacement of the arcs, per tendon; 0 where it does not count.
     misfit: Vec<f64>,
-    pub(super) counted: Vec<bool>,
+    pub(super) active: Vec<bool>,
     /// The inverse for the last pattern of counted tendons that was not "all".
-    pub(super) masked: Option<Masked>,
+    pub(super) masked: Option<MaskedInverse>,
 }
 
 impl Scratch {
@@ -33,6 +50,24 @@ impl Scratch {
 }
 
 /// The constant-curvature model of a robot, ready to solve.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings, Plan};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let model = ConstantCurvature::new(&robot, &plan);
+/// let shape = model.shape(&[-0.01, f64::INFINITY, f64::INFINITY])?;
+/// // Bent by 1 rad towards +x.
+/// assert!(shape.state.frames[10].translation.x > 0.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct ConstantCurvature<'r> {
     pub(super) robot: &'r Robot,
@@ -54,14 +89,14 @@ impl<'r> ConstantCurvature<'r> {
     fn fit(&self, displacements: &[f64], work: &mut Scratch) -> Status {
         let plan = self.plan;
         let width = plan.width();
-        plan.counted(displacements, &mut work.counted);
-        plan.remember(&work.counted, &mut work.masked);
-        let inverse = plan.inverse_for(&work.counted, work.masked.as_ref());
+        plan.mark_active_tendons(displacements, &mut work.active);
+        plan.cache_inverse(&work.active, &mut work.masked);
+        let inverse = plan.inverse_for(&work.active, work.masked.as_ref());
         work.arcs.clear();
         for (i, segment) in plan.segments.iter().enumerate() {
             let unknown = |row: usize| {
-                let counted = work.counted.iter().zip(displacements).enumerate();
-                counted.fold(0.0, |sum, (k, (counts, displacement))| {
+                let active = work.active.iter().zip(displacements).enumerate();
+                active.fold(0.0, |sum, (k, (counts, displacement))| {
                     if *counts { sum + inverse[(width * i + row, k)] * displacement } else { sum }
                 })
             };
@@ -80,7 +115,7 @@ impl<'r> ConstantCurvature<'r> {
     }
 
     /// Places the disks.
-    fn place(&self, work: &mut Scratch) {
+    fn write_frames(&self, work: &mut Scratch) {
         let Scratch { state, arcs, .. } = work;
         state.clear();
         let mut base = *self.robot.base();
@@ -116,8 +151,8 @@ impl<'r> ConstantCurvature<'r> {
     }
 
     /// Measures tendons along their arcs.
-    fn measure(&self, displacements: &[f64], work: &mut Scratch) {
-        let Scratch { state, arcs, misfit, counted, .. } = work;
+    fn measure_tendons(&self, displacements: &[f64], work: &mut Scratch) {
+        let Scratch { state, arcs, misfit, active, .. } = work;
         misfit.clear();
         for (k, path) in self.robot.paths().iter().enumerate() {
             let (mut whole, mut own) = (0.0, 0.0);
@@ -133,7 +168,7 @@ impl<'r> ConstantCurvature<'r> {
                 Coupling::Coupled => whole,
                 Coupling::PerSegment => own,
             };
-            misfit.push(if counted[k] { displacements[k] - fitted } else { 0.0 });
+            misfit.push(if active[k] { displacements[k] - fitted } else { 0.0 });
         }
         state.tensions.resize(displacements.len(), f64::NAN);
     }
@@ -150,7 +185,7 @@ impl<'r> ConstantCurvature<'r> {
     ) -> Result<Matrix6xX<f64>, InvalidInput> {
         if self.fit(displacements, work) != Status::Converged {
             let expected = "displacements that the segments can take";
-            let got = obstacle(&work.arcs).unwrap_or_default();
+            let got = arc_fault(&work.arcs).unwrap_or_default();
             return Err(InvalidInput::new("displacements", expected, format!("some that {got}")));
         }
         let width = self.plan.width();
@@ -164,12 +199,12 @@ impl<'r> ConstantCurvature<'r> {
                     .copy_from(&(by_arcs.column(3 * i + j) * scale));
             }
         }
-        Ok(by_unknowns * self.plan.inverse_for(&work.counted, work.masked.as_ref()))
+        Ok(by_unknowns * self.plan.inverse_for(&work.active, work.masked.as_ref()))
     }
 }
 
-/// What displacements do that gives arcs which no robot can take.
-fn obstacle(arcs: &[Arc]) -> Option<String> {
+/// Fault of displacements whose arcs no robot can take.
+fn arc_fault(arcs: &[Arc]) -> Option<String> {
     if let Some(i) = arcs.iter().position(|arc| !arc.is_finite()) {
         return Some(format!("make the arc of segment {i} overflow"));
     }
@@ -190,8 +225,8 @@ impl Model for ConstantCurvature<'_> {
 
     fn solve(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
         let status = self.fit(displacements, work);
-        self.place(work);
-        self.measure(displacements, work);
+        self.write_frames(work);
+        self.measure_tendons(displacements, work);
         let paths = self.robot.paths().iter();
         let residual = if status == Status::NumericalError {
             f64::INFINITY
@@ -211,8 +246,8 @@ impl Model for ConstantCurvature<'_> {
     }
 
     fn message(&self, _: &[f64], work: &Scratch) -> String {
-        if let Some(obstacle) = obstacle(&work.arcs) {
-            return format!("the displacements {obstacle}");
+        if let Some(fault) = arc_fault(&work.arcs) {
+            return format!("the displacements {fault}");
         }
         let names = self.robot.tendon_names();
         let off: Vec<String> = (work.misfit.iter().zip(self.robot.paths()).zip(names))

@@ -1,4 +1,4 @@
-//! What the constant-curvature model knows of a robot before any displacement.
+//! Constant-curvature data of a robot, independent of the displacements.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,7 +7,14 @@ use crate::error::InvalidInput;
 use crate::robot::Robot;
 use crate::solve::pseudo_inverse::{PseudoInverse, null_space};
 
-/// How displacements reach the segments.
+/// Coupling between displacements and segments.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvatureSettings, Coupling};
+///
+/// let settings = ConstantCurvatureSettings { coupling: Coupling::PerSegment, extensible: false };
+/// assert_eq!(settings.coupling.as_str(), "per_segment");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Coupling {
     /// Displacements are measured at the base; a tendon is shortened in every segment it runs through.
@@ -40,9 +47,23 @@ impl Coupling {
 }
 
 /// Choices of the constant-curvature model.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let settings = ConstantCurvatureSettings { extensible: true, ..Default::default() };
+/// assert_eq!(Plan::new(&robot, settings)?.width(), 3);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ConstantCurvatureSettings {
-    /// How displacements reach the segments.
+    /// Coupling between displacements and segments.
     pub coupling: Coupling,
     /// The length of every segment is an unknown too; at least three tendons must end at each that has any.
     pub extensible: bool,
@@ -74,7 +95,23 @@ impl Segment {
     }
 }
 
-/// What the model knows of a robot before any displacement.
+/// Constant-curvature data of a robot, independent of the displacements.
+///
+/// ```
+/// use tdcr::constant_curvature::{Arc, ConstantCurvatureSettings, Plan, displacements};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// assert_eq!((plan.segment_count(), plan.width()), (1, 2));
+/// let pulls = displacements(&plan, &[Arc::new(5.0, 0.0, 0.2)]);
+/// assert!((pulls[0] + 0.01 * 5.0 * 0.2).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(super) segments: Vec<Segment>,
@@ -85,7 +122,7 @@ pub struct Plan {
     pub(super) matrix: DMatrix<f64>,
     /// Its inverse when every tendon counts.
     inverse: PseudoInverse,
-    unmoved: Vec<DVector<f64>>,
+    unactuated_directions: Vec<DVector<f64>>,
 }
 
 /// Unknowns of a segment: two bends, and the elongation when it is extensible.
@@ -126,8 +163,8 @@ impl Plan {
             }
         }
         let inverse = PseudoInverse::new(&matrix);
-        let unmoved = null_space(&matrix);
-        Ok(Self { segments, settings, scale, matrix, inverse, unmoved })
+        let unactuated_directions = null_space(&matrix);
+        Ok(Self { segments, settings, scale, matrix, inverse, unactuated_directions })
     }
 
     /// Segments, base first.
@@ -152,7 +189,7 @@ impl Plan {
         unknowns(self.settings.extensible)
     }
 
-    /// How many of the matrix's unknowns a unit of a bending vector \[rad\], or of a length over the
+    /// Unknowns of the matrix per unit of a bending vector \[rad\], or of a length over the
     /// rest length, is \[m\].
     pub(crate) fn unit(&self, unknown: usize) -> f64 {
         let bends = unknown % self.width() < 2;
@@ -165,53 +202,53 @@ impl Plan {
     }
 
     /// Directions of the matrix's unknowns that no tendon moves; the forward model leaves them at rest.
-    pub(crate) fn unmoved(&self) -> &[DVector<f64>] {
-        &self.unmoved
+    pub(crate) fn unactuated_directions(&self) -> &[DVector<f64>] {
+        &self.unactuated_directions
     }
 
     /// Tendons that count: not free, and not the only, released one of its segment.
-    pub(super) fn counted(&self, displacements: &[f64], counted: &mut Vec<bool>) {
-        counted.clear();
-        counted.extend(displacements.iter().map(|d| d.is_finite()));
+    pub(super) fn mark_active_tendons(&self, displacements: &[f64], active: &mut Vec<bool>) {
+        active.clear();
+        active.extend(displacements.iter().map(|d| d.is_finite()));
         for segment in &self.segments {
-            let mut active = segment.own.iter().filter(|k| counted[**k]);
-            if let (Some(&only), None) = (active.next(), active.next())
+            let mut own = segment.own.iter().filter(|k| active[**k]);
+            if let (Some(&only), None) = (own.next(), own.next())
                 && displacements[only] > 0.0
             {
-                counted[only] = false;
+                active[only] = false;
             }
         }
     }
 
-    /// Makes the inverse over the tendons that count, unless it is at hand; columns of the others are
+    /// Computes the inverse over the tendons that count, unless it is cached; columns of the others are
     /// zero.
-    pub(super) fn remember(&self, counted: &[bool], masked: &mut Option<Masked>) {
-        let at_hand = masked.as_ref().is_some_and(|(pattern, _)| pattern == counted);
-        if at_hand || counted.iter().all(|counts| *counts) {
+    pub(super) fn cache_inverse(&self, active: &[bool], masked: &mut Option<MaskedInverse>) {
+        let at_hand = masked.as_ref().is_some_and(|(pattern, _)| pattern == active);
+        if at_hand || active.iter().all(|counts| *counts) {
             return;
         }
         let mut matrix = self.matrix.clone();
-        for (k, _) in counted.iter().enumerate().filter(|(_, counts)| !**counts) {
+        for (k, _) in active.iter().enumerate().filter(|(_, counts)| !**counts) {
             matrix.row_mut(k).fill(0.0);
         }
-        *masked = Some((counted.to_vec(), PseudoInverse::new(&matrix).matrix));
+        *masked = Some((active.to_vec(), PseudoInverse::new(&matrix).matrix));
     }
 
-    /// The inverse over the tendons that count, after [`Plan::remember`].
+    /// The inverse over the tendons that count, after [`Plan::cache_inverse`].
     pub(super) fn inverse_for<'a>(
         &'a self,
-        counted: &[bool],
-        masked: Option<&'a Masked>,
+        active: &[bool],
+        masked: Option<&'a MaskedInverse>,
     ) -> &'a DMatrix<f64> {
         match masked {
-            Some((pattern, inverse)) if pattern == counted => inverse,
+            Some((pattern, inverse)) if pattern == active => inverse,
             _ => &self.inverse.matrix,
         }
     }
 }
 
 /// A pattern of counted tendons and the inverse over them.
-pub(super) type Masked = (Vec<bool>, DMatrix<f64>);
+pub(super) type MaskedInverse = (Vec<bool>, DMatrix<f64>);
 
 fn check_straight(robot: &Robot) -> Result<(), InvalidInput> {
     if !robot.backbone().is_straight() {

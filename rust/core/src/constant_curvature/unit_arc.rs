@@ -11,7 +11,7 @@ use crate::lie::coefficients::Angle;
 
 /// The arc and the coefficients that everything else is made of.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Bent {
+pub(crate) struct UnitArc {
     x: f64,
     y: f64,
     a: f64,
@@ -23,14 +23,14 @@ pub(crate) struct Bent {
 
 /// Second derivatives.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Second {
-    /// Of the end, by x twice, by x and y, by y twice.
+pub(crate) struct SecondDerivatives {
+    /// Second derivatives of the end: by x twice, by x and y, by y twice.
     pub(crate) end: [Vector3<f64>; 3],
     /// `turned[i][j]`: derivative of the i-th angular velocity by the j-th component.
     pub(crate) turned: [[Vector3<f64>; 2]; 2],
 }
 
-impl Bent {
+impl UnitArc {
     #[inline(always)]
     pub(crate) fn new(bend: Vector2<f64>) -> Self {
         let angle = Angle::of_square(bend.norm_squared());
@@ -72,7 +72,9 @@ impl Bent {
     /// and by the length.
     pub(crate) fn derivative(&self, length: f64) -> Matrix6x3<f64> {
         let mut out = Matrix6x3::zeros();
-        for (j, (moved, turned)) in self.moved().iter().zip(self.turned()).enumerate() {
+        for (j, (moved, turned)) in
+            self.end_derivatives().iter().zip(self.rotation_derivatives()).enumerate()
+        {
             out.fixed_view_mut::<3, 1>(0, j).copy_from(&(moved * length));
             out.fixed_view_mut::<3, 1>(3, j).copy_from(&turned);
         }
@@ -82,7 +84,7 @@ impl Bent {
 
     /// Derivatives of the end by x and by y.
     #[inline(always)]
-    pub(crate) fn moved(&self) -> [Vector3<f64>; 2] {
+    pub(crate) fn end_derivatives(&self) -> [Vector3<f64>; 2] {
         let Self { x, y, b, c, b_slope, .. } = *self;
         // a'(t) / t = c - b.
         let (cross, a_slope) = (x * y * b_slope, c - b);
@@ -94,7 +96,7 @@ impl Bent {
 
     /// Angular velocities of the end, base axes, by x and by y: the columns of the left Jacobian.
     #[inline(always)]
-    pub(crate) fn turned(&self) -> [Vector3<f64>; 2] {
+    pub(crate) fn rotation_derivatives(&self) -> [Vector3<f64>; 2] {
         let Self { x, y, b, c, .. } = *self;
         [
             Vector3::new(-c * x * y, 1.0 - c * y * y, -b * y),
@@ -104,12 +106,12 @@ impl Bent {
 
     /// Second derivatives.
     #[rustfmt::skip] // the vectors are read side by side
-    pub(crate) fn second(&self) -> Second {
+    pub(crate) fn second(&self) -> SecondDerivatives {
         let Self { x, y, b, c, b_slope: b1, .. } = *self;
         let angle = Angle::of_square(x * x + y * y);
         let (b2, c1) = (angle.b_bend(), angle.c_slope());
         let (a1, a2) = (c - b, c1 - b1);
-        Second {
+        SecondDerivatives {
             end: [
                 Vector3::new(x * (3.0 * b1 + x * x * b2), y * (b1 + x * x * b2), a1 + x * x * a2),
                 Vector3::new(y * (b1 + x * x * b2), x * (b1 + y * y * b2), x * y * a2),
@@ -141,14 +143,17 @@ mod tests {
             for k in 0..12 {
                 let (sin, cos) = (0.1 + 0.55 * f64::from(k)).sin_cos();
                 let bend = Vector2::new(angle * cos, angle * sin);
-                let second = Bent::new(bend).second();
+                let second = UnitArc::new(bend).second();
                 for j in 0..2 {
                     let mut step = Vector2::zeros();
                     step[j] = h;
-                    let (up, down) = (Bent::new(bend + step), Bent::new(bend - step));
+                    let (up, down) = (UnitArc::new(bend + step), UnitArc::new(bend - step));
                     for i in 0..2 {
-                        let moved = (up.moved()[i] - down.moved()[i]) / (2.0 * h);
-                        let turned = (up.turned()[i] - down.turned()[i]) / (2.0 * h);
+                        let moved =
+                            (up.end_derivatives()[i] - down.end_derivatives()[i]) / (2.0 * h);
+                        let turned = (up.rotation_derivatives()[i]
+                            - down.rotation_derivatives()[i])
+                            / (2.0 * h);
                         assert!((second.end[i + j] - moved).amax() < 1e-9, "{angle} {k}");
                         assert!((second.turned[i][j] - turned).amax() < 1e-9, "{angle} {k}");
                     }

@@ -1,26 +1,26 @@
-//! A chain of arcs before a target: residuals of the tool, their derivatives, the bending energy.
+//! Chain of arcs and a target: residuals of the tool, their derivatives, the bending energy.
 
 use nalgebra::{Vector2, Vector3, Vector6};
 
 use crate::constant_curvature::Plan;
-use crate::constant_curvature::unit_arc::Bent;
+use crate::constant_curvature::unit_arc::UnitArc;
 use crate::lie::Pose;
 use crate::robot::Robot;
 use crate::solve::levenberg_marquardt::Problem;
 
 use super::InverseSettings;
-use super::pose_residual::{Aim, Twist};
+use super::pose_residual::{PoseResidual, Twist};
 
 /// Unknowns, base first: for every segment its bending vector \[rad\] and, if it is extensible, its length
 /// over its rest length.
 #[derive(Clone, Debug)]
-pub(crate) struct Chain<'a> {
+pub(crate) struct ArcProblem<'a> {
     robot: &'a Robot,
     plan: &'a Plan,
-    pub(super) aim: Aim<'a>,
+    pub(super) pose_residual: PoseResidual<'a>,
     /// Stiffness of every segment's bending vector, of mean 1.
     stiffness: Vec<f64>,
-    bents: Vec<Bent>,
+    arcs: Vec<UnitArc>,
     /// Length of every segment \[m\].
     lengths: Vec<f64>,
     /// Frame of every segment's base and of the last tip.
@@ -29,7 +29,7 @@ pub(crate) struct Chain<'a> {
     columns: Vec<Twist>,
 }
 
-impl<'a> Chain<'a> {
+impl<'a> ArcProblem<'a> {
     pub(crate) fn new(robot: &'a Robot, plan: &'a Plan, settings: &'a InverseSettings) -> Self {
         let count = plan.segments().len();
         let stiffness: Vec<f64> = plan.segments().map(|s| s.stiffness(robot)).collect();
@@ -37,61 +37,62 @@ impl<'a> Chain<'a> {
         Self {
             robot,
             plan,
-            aim: Aim::new(robot, settings),
+            pose_residual: PoseResidual::new(robot, settings),
             stiffness: stiffness.iter().map(|s| s / mean).collect(),
-            bents: Vec::with_capacity(count),
+            arcs: Vec::with_capacity(count),
             lengths: Vec::with_capacity(count),
             frames: Vec::with_capacity(count + 1),
             columns: Vec::with_capacity(3 * count),
         }
     }
 
-    /// Places every segment.
-    fn place(&mut self, z: &[f64]) {
-        self.bents.clear();
+    /// Composes the frames of all segments.
+    fn set_arcs(&mut self, z: &[f64]) {
+        self.arcs.clear();
         self.lengths.clear();
         self.frames.clear();
         let mut frame = Pose::identity();
         self.frames.push(frame);
         let width = self.plan.width();
         for (segment, q) in self.plan.segments().zip(z.chunks_exact(width)) {
-            let bent = Bent::new(Vector2::new(q[0], q[1]));
+            let arc = UnitArc::new(Vector2::new(q[0], q[1]));
             let ratio = if width == 3 { q[2] } else { 1.0 };
             let length = segment.rest_length * ratio;
-            frame = frame.compose(&bent.frame(length));
-            self.bents.push(bent);
+            frame = frame.compose(&arc.frame(length));
+            self.arcs.push(arc);
             self.lengths.push(length);
             self.frames.push(frame);
         }
         let tool = self.robot.tool();
-        self.aim.place(frame.transform(&tool.translation), || frame.rotation * tool.rotation);
+        self.pose_residual
+            .update(frame.transform(&tool.translation), || frame.rotation * tool.rotation);
     }
 
-    /// Derivatives of the tool's place and rotation by every unknown.
+    /// Derivatives of the tool's position and rotation with respect to every unknown.
     fn differentiate(&mut self) {
         self.columns.clear();
         for (i, segment) in self.plan.segments().enumerate() {
-            let (bent, length) = (&self.bents[i], self.lengths[i]);
+            let (arc, length) = (&self.arcs[i], self.lengths[i]);
             let base = self.frames[i].rotation;
-            let lever = self.aim.tool - self.frames[i + 1].translation;
-            for (moved, turned) in bent.moved().iter().zip(bent.turned()) {
+            let lever = self.pose_residual.tool - self.frames[i + 1].translation;
+            for (moved, turned) in arc.end_derivatives().iter().zip(arc.rotation_derivatives()) {
                 let spin = base * turned;
                 self.columns.push((base * (moved * length) + spin.cross(&lever), spin));
             }
             if self.plan.width() == 3 {
-                self.columns.push((base * (bent.end() * segment.rest_length), Vector3::zeros()));
+                self.columns.push((base * (arc.end() * segment.rest_length), Vector3::zeros()));
             }
         }
     }
 
-    /// Second derivatives of the tool's place and rotation by two unknowns of one segment.
-    fn within(&self, i: usize) -> [[(Vector3<f64>, Vector3<f64>); 3]; 3] {
-        let second = self.bents[i].second();
+    /// Second derivatives of the tool's position and rotation with respect to two unknowns of one segment.
+    fn second_derivatives(&self, i: usize) -> [[(Vector3<f64>, Vector3<f64>); 3]; 3] {
+        let second = self.arcs[i].second();
         let base = self.frames[i].rotation;
-        let lever = self.aim.tool - self.frames[i + 1].translation;
+        let lever = self.pose_residual.tool - self.frames[i + 1].translation;
         let (length, rest) = (self.lengths[i], self.plan.segment(i).rest_length);
-        let spins = self.bents[i].turned().map(|turned| base * turned);
-        let moved = self.bents[i].moved();
+        let spins = self.arcs[i].rotation_derivatives().map(|turned| base * turned);
+        let moved = self.arcs[i].end_derivatives();
         let mut out = [[(Vector3::zeros(), Vector3::zeros()); 3]; 3];
         for j in 0..2 {
             for k in 0..2 {
@@ -106,30 +107,30 @@ impl<'a> Chain<'a> {
     }
 }
 
-impl Problem<6> for Chain<'_> {
+impl Problem<6> for ArcProblem<'_> {
     fn evaluate(&mut self, z: &[f64], residual: &mut Vector6<f64>, jacobian: &mut [Vector6<f64>]) {
-        self.place(z);
+        self.set_arcs(z);
         self.differentiate();
-        *residual = self.aim.residual();
-        self.aim.write_columns(&self.columns, jacobian);
+        *residual = self.pose_residual.residual();
+        self.pose_residual.write_jacobian(&self.columns, jacobian);
     }
 
-    fn squared(&mut self, z: &[f64]) -> f64 {
-        self.place(z);
-        self.aim.residual().norm_squared()
+    fn squared_norm(&mut self, z: &[f64]) -> f64 {
+        self.set_arcs(z);
+        self.pose_residual.residual().norm_squared()
     }
 
-    fn met(&self, residual: &Vector6<f64>) -> bool {
-        self.aim.met(residual)
+    fn is_met(&self, residual: &Vector6<f64>) -> bool {
+        self.pose_residual.is_met(residual)
     }
 
     fn add_hessian(&mut self, _: &[f64], weights: &Vector6<f64>, hessian: &mut [f64]) {
         let width = self.plan.width();
         let size = self.columns.len();
-        let rotates = self.aim.rotates();
-        let push = self.aim.curvature(weights);
+        let rotates = self.pose_residual.rotates();
+        let push = self.pose_residual.curvature(weights);
         for i in 0..size / width {
-            let own = self.within(i);
+            let own = self.second_derivatives(i);
             for a in width * i..width * (i + 1) {
                 let (velocity, spin) = &self.columns[a];
                 let row = push.row(spin);
@@ -241,31 +242,31 @@ mod tests {
                 rotation_weight: [None, Some(0.1), Some(0.02)],
                 ..InverseSettings::default()
             };
-            let mut chain = Chain::new(&robot, &plan, &settings);
+            let mut problem = ArcProblem::new(&robot, &plan, &settings);
             let z = unknowns(case, extensible, &mut u);
-            chain.place(&z);
-            let tip = chain.frames[3].compose(robot.tool());
+            problem.set_arcs(&z);
+            let tip = problem.frames[3].compose(robot.tool());
             let axis = Vector3::from_fn(|_, _| u(-1.0, 1.0)).normalize();
             let off = axis * if case % 3 == 0 { 1e-6 } else { u(0.0, 3.0) };
             largest = largest.max(off.norm());
             let translation = tip.translation + Vector3::from_fn(|_, _| u(-0.1, 0.1));
-            chain.aim.at(if posed {
+            problem.pose_residual.set_target(if posed {
                 Target::Pose(Pose { rotation: tip.rotation * so3::exp(&off), translation })
             } else {
                 Target::Position(translation)
             });
-            check(&mut chain, &z, &Vector6::from_fn(|_, _| u(-1.0, 1.0)), case);
+            check(&mut problem, &z, &Vector6::from_fn(|_, _| u(-1.0, 1.0)), case);
         }
         assert!(largest > 2.95);
     }
 
-    fn check(chain: &mut Chain<'_>, z: &[f64], weights: &Vector6<f64>, case: usize) {
+    fn check(problem: &mut ArcProblem<'_>, z: &[f64], weights: &Vector6<f64>, case: usize) {
         let (size, h) = (z.len(), 1e-5);
         let mut at = |z: &[f64]| {
             let (mut residual, mut jacobian) = (Vector6::zeros(), vec![Vector6::zeros(); size]);
-            chain.evaluate(z, &mut residual, &mut jacobian);
+            problem.evaluate(z, &mut residual, &mut jacobian);
             let mut hessian = vec![0.0; size * size];
-            chain.add_hessian(z, weights, &mut hessian);
+            problem.add_hessian(z, weights, &mut hessian);
             (residual, jacobian, hessian)
         };
         let (_, jacobian, hessian) = at(z);
@@ -280,9 +281,9 @@ mod tests {
             let scale = 1.0 + column.amax();
             assert!((column - jacobian[a]).amax() < 1e-7 * scale, "{case} {a}");
             for b in 0..=a {
-                let bent = weights.dot(&(up.1[b] - down.1[b])) / (2.0 * h);
-                let off = (hessian[a * size + b] - bent).abs();
-                assert!(off < 1e-6 * (1.0 + bent.abs()), "{case} {a} {b} {off:e} {bent}");
+                let arc = weights.dot(&(up.1[b] - down.1[b])) / (2.0 * h);
+                let off = (hessian[a * size + b] - arc).abs();
+                assert!(off < 1e-6 * (1.0 + arc.abs()), "{case} {a} {b} {off:e} {arc}");
             }
         }
     }
@@ -295,21 +296,21 @@ mod tests {
             let choices = ConstantCurvatureSettings { extensible, ..Default::default() };
             let plan = Plan::new(&robot, choices).unwrap();
             let settings = InverseSettings::default();
-            let chain = Chain::new(&robot, &plan, &settings);
+            let problem = ArcProblem::new(&robot, &plan, &settings);
             let z = unknowns(1, extensible, &mut u);
             let size = z.len();
             let (mut slope, mut other) = (vec![0.0; size], vec![0.0; size]);
             let mut hessian = vec![0.0; size * size];
-            chain.energy(&z, &mut slope);
-            chain.add_energy_hessian(&z, &mut hessian);
+            problem.energy(&z, &mut slope);
+            problem.add_energy_hessian(&z, &mut hessian);
             for a in 0..size {
                 let h = 1e-4;
                 let mut moved = z.clone();
                 moved[a] += h;
-                let up = chain.energy(&moved, &mut other);
+                let up = problem.energy(&moved, &mut other);
                 assert!((other[a] - slope[a] - h * hessian[a * (size + 1)]).abs() < 1e-12);
                 moved[a] -= 2.0 * h;
-                let down = chain.energy(&moved, &mut other);
+                let down = problem.energy(&moved, &mut other);
                 assert!(((up - down) / (2.0 * h) - slope[a]).abs() < 1e-10);
             }
         }

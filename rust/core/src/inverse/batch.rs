@@ -14,13 +14,37 @@ use crate::model::State;
 use crate::robot::Robot;
 
 /// Answers, row by row.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
+/// # use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// # let (bounds, settings) = (Bounds::default(), InverseSettings::default());
+/// # let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
+/// let tips = [0.5, 1.0].map(|angle: f64| {
+///     Target::Position(tdcr::constant_curvature::Arc::new(angle / 0.2, 0.0, 0.2).frame(1.0).translation)
+/// });
+/// let (threads, control) = (tdcr::batch::pool(Some(1))?, tdcr::batch::Control::default());
+/// let rows = tdcr::inverse::invert_rows(&inverse, &tips, &[], &threads, &control)?.unwrap_or_default();
+/// assert_eq!(rows.displacements.len(), 2 * 3);
+/// assert!((rows.displacements[0] + 0.01 * 0.5).abs() < 1e-8);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct InverseRows {
     /// Displacements, one row per target \[m\].
     pub displacements: Vec<f64>,
     /// Tensions, likewise; NaN where the model knows no forces.
     pub tensions: Vec<f64>,
-    /// How each row ended.
+    /// Outcome of every row.
     pub answers: Vec<Answer>,
 }
 
@@ -34,12 +58,26 @@ impl InverseRows {
     }
 }
 
-/// What batches and paths need of an inverse.
+/// Inverse of one model, as batches and paths use it.
+///
+/// ```
+/// use tdcr::inverse::{Inverter, Target};
+///
+/// // Works with any model.
+/// fn displacements<I: Inverter>(inverse: &I, target: &Target) -> Vec<f64> {
+///     let mut scratch = inverse.buffers(None);
+///     inverse.solve(target, None, &mut scratch);
+///     let mut displacements = vec![0.0; inverse.robot().tendons().len()];
+///     inverse.write_displacements(&scratch, &mut displacements);
+///     displacements
+/// }
+/// # let _ = displacements::<tdcr::inverse::RodInverse<'_>>;
+/// ```
 pub trait Inverter: Sync {
-    /// Where a solve may start.
+    /// Start of a solve.
     type Start: Clone + Sync;
     /// Buffers of a solve, and what it found.
-    type Work<'w>
+    type Scratch<'w>
     where
         Self: 'w;
 
@@ -49,7 +87,7 @@ pub trait Inverter: Sync {
     /// The choices it was prepared with.
     fn settings(&self) -> &InverseSettings;
 
-    /// Checks that a target is near enough to be told from its neighbours.
+    /// Checks that a target is near enough for rounding to distinguish it from its neighbours.
     ///
     /// # Errors
     /// `InvalidInput` for one that is further from the base than a million times the robot's length and its tool's.
@@ -57,7 +95,7 @@ pub trait Inverter: Sync {
         near_enough("target", self.robot(), &target.position())
     }
 
-    /// Where a solve starts from displacements; what that takes ends soon after the flag is set, if there is one.
+    /// Start of a solve from displacements; its computation ends soon after the flag is set, if there is one.
     ///
     /// # Errors
     /// `InvalidInput` for displacements that do not fit the robot.
@@ -68,38 +106,38 @@ pub trait Inverter: Sync {
     ) -> Result<Self::Start, InvalidInput>;
 
     /// Buffers for this inverse; solves end before their next start when the flag is set, if there is one.
-    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Self::Work<'w>;
+    fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Self::Scratch<'w>;
 
-    /// Seeks what brings the tool to `target`; first from `start`, if given.
+    /// Solves for unknowns that bring the tool to `target`; first from `start`, if given.
     fn solve(
         &self,
         target: &Target,
         start: Option<&Self::Start>,
-        work: &mut Self::Work<'_>,
+        work: &mut Self::Scratch<'_>,
     ) -> Answer;
 
-    /// Seeks again from where the last solve in `work` ended, as along a path.
-    fn follow(&self, target: &Target, work: &mut Self::Work<'_>) -> Answer;
+    /// Solves again from the point where the last solve in `work` ended, as along a path.
+    fn follow(&self, target: &Target, work: &mut Self::Scratch<'_>) -> Answer;
 
-    /// The displacements of what the last solve in `work` found \[m\].
-    fn write_displacements(&self, work: &Self::Work<'_>, place: &mut [f64]);
+    /// Writes the displacements of the last solve in `work` \[m\].
+    fn write_displacements(&self, work: &Self::Scratch<'_>, place: &mut [f64]);
 
-    /// Their tensions, in the unit of the results; untouched where the model knows no forces.
-    fn write_tensions(&self, work: &Self::Work<'_>, place: &mut [f64]);
+    /// Writes its tensions, in the unit of the results; untouched where the model has no forces.
+    fn write_tensions(&self, work: &Self::Scratch<'_>, place: &mut [f64]);
 
-    /// The shape that the last solve in `work` found, where displacements do not say which one it is.
-    fn state(&self, _work: &mut Self::Work<'_>) -> Option<State> {
+    /// Shape that the last solve in `work` found, where displacements do not determine it.
+    fn state(&self, _work: &mut Self::Scratch<'_>) -> Option<State> {
         None
     }
 
-    /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
-    fn message(&self, answer: &Answer, work: &Self::Work<'_>) -> String;
+    /// Reason why the last solve in `work` did not converge, in a sentence; empty when it did.
+    fn message(&self, answer: &Answer, work: &Self::Scratch<'_>) -> String;
 }
 
-/// Targets are no further from the base than so many lengths of the robot and its tool: rounding would decide.
+/// Largest distance of a target from the base, in lengths of the robot and its tool: beyond it rounding decides.
 const FARTHEST: f64 = 1e6;
 
-/// Checks a wanted place.
+/// Checks a target position.
 ///
 /// # Errors
 /// `InvalidInput` for one that is too far from the base.

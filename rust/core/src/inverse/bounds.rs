@@ -1,4 +1,4 @@
-//! What an inverse may use, and the region of unknowns it leaves.
+//! Bounds of an inverse, and the region of unknowns inside them.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,6 +10,16 @@ use crate::solve::convex_region::{Disc, Region};
 use crate::solve::pseudo_inverse::null_space;
 
 /// Lowest and highest values, one pair for all or one for each.
+///
+/// ```
+/// use tdcr::inverse::Range;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let range = Range::new("displacement", vec![-0.03], vec![0.01, 0.02, 0.03])?;
+/// assert_eq!(range.at(1), (-0.03, 0.02));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Range {
     lower: Vec<f64>,
@@ -72,11 +82,22 @@ impl Range {
 }
 
 /// Bounds of an inverse. What is `None` has the default.
+///
+/// ```
+/// use tdcr::inverse::{Bounds, Range};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let pretension = Range::new("tension", vec![20.0], vec![2000.0])?;
+/// let bounds = Bounds { tension: Some(pretension), ..Bounds::default() };
+/// assert!(bounds.displacement.is_none());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bounds {
-    /// Of tendon displacements \[m\].
+    /// Range of tendon displacements \[m\].
     pub displacement: Option<Range>,
-    /// Of tensions, where the model has some, in the unit of its results; 0 and more.
+    /// Range of tensions, where the model has some, in the unit of its results; 0 and more.
     pub tension: Option<Range>,
     /// Largest curvature of every segment \[1/m\].
     pub curvature: Option<Range>,
@@ -94,33 +115,33 @@ const STRAIGHT: f64 = 1e-9;
 /// No segment becomes shorter than this share of its rest length.
 const SHORTEST: f64 = 1e-3;
 
-/// Where unknowns may be.
+/// Region of the unknowns, and the box of swarms.
 #[derive(Clone, Debug)]
-pub(super) struct Space {
+pub(super) struct SearchSpace {
     pub(super) region: Region,
     /// The box of swarms, beyond which descents may lead.
     pub(super) lower: Vec<f64>,
     pub(super) upper: Vec<f64>,
 }
 
-/// The region of the unknowns of `Chain`, and where random starts are drawn.
+/// The region of the unknowns of `ArcProblem`, and where random starts are drawn.
 #[derive(Clone, Debug)]
-pub(super) struct Reach {
+pub(super) struct ArcSpace {
     /// Swarms turn no segment by more than half a turn.
-    pub(super) space: Space,
+    pub(super) search: SearchSpace,
     /// Per segment.
-    pub(super) draws: Vec<Draw>,
+    pub(super) draws: Vec<SegmentRange>,
     /// Freedoms that the tendons have and the bounds leave.
     pub(super) freedoms: usize,
     /// Lowest and highest displacement of every tendon \[m\].
     ranges: Vec<(f64, f64)>,
-    /// What the bounds and the discs of the region hold back.
+    /// Names of the bounds and of the discs of the region, for messages.
     labels: (Vec<String>, Vec<String>),
 }
 
-/// Where a segment's unknowns are drawn from.
+/// Ranges from which a segment's unknowns are drawn.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Draw {
+pub(super) struct SegmentRange {
     /// Largest angle \[rad\].
     pub(super) widest: f64,
     /// Shortest and longest length over the rest length.
@@ -128,7 +149,7 @@ pub(super) struct Draw {
     pub(super) longest: f64,
 }
 
-impl Reach {
+impl ArcSpace {
     pub(super) fn new(
         plan: &Plan,
         bounds: &Bounds,
@@ -136,7 +157,8 @@ impl Reach {
     ) -> Result<Self, InvalidInput> {
         bounds.check(plan, names.len())?;
         let (width, size) = (plan.width(), plan.width() * plan.segment_count());
-        let draws: Vec<Draw> = (0..plan.segment_count()).map(|i| bounds.draw(plan, i)).collect();
+        let draws: Vec<SegmentRange> =
+            (0..plan.segment_count()).map(|i| bounds.segment_range(plan, i)).collect();
         let ranges: Vec<_> = (0..names.len()).map(|k| bounds.displacements(plan, k)).collect();
         let sides = draws.iter().flat_map(|draw| {
             let widest = draw.widest.min(PI);
@@ -144,27 +166,27 @@ impl Reach {
             sides.into_iter().take(width)
         });
         let (lower, upper) = sides.unzip();
-        let mut reach = Self {
-            space: Space { region: Region::new(size), lower, upper },
+        let mut space = Self {
+            search: SearchSpace { region: Region::new(size), lower, upper },
             draws,
             freedoms: 0,
             ranges,
             labels: (Vec::new(), Vec::new()),
         };
-        reach.equate(plan);
+        space.add_equations(plan);
         for i in 0..plan.segment_count() {
-            reach.bound_length(plan, bounds, i);
-            reach.bound_turn(plan, bounds, i);
+            space.bound_length(plan, bounds, i);
+            space.bound_turn(plan, bounds, i);
         }
-        reach.bound_displacements(plan, names);
-        Ok(reach)
+        space.bound_displacements(plan, names);
+        Ok(space)
     }
 
-    /// What is no freedom: directions that no tendon moves, straight segments, values held by equal bounds.
-    fn equate(&mut self, plan: &Plan) {
-        let (width, size) = (plan.width(), self.space.region.size());
+    /// Adds an equation for every direction that is no freedom: moved by no tendon, straight, or with equal bounds.
+    fn add_equations(&mut self, plan: &Plan) {
+        let (width, size) = (plan.width(), self.search.region.size());
         let mut equations: Vec<(Vec<f64>, f64)> = Vec::new();
-        for direction in plan.unmoved() {
+        for direction in plan.unactuated_directions() {
             let normal: Vec<f64> = (0..size).map(|j| direction[j] * plan.unit(j)).collect();
             let at_rest = (0..size).map(|j| normal[j] * rest(plan, j)).sum();
             equations.push((normal, at_rest));
@@ -185,7 +207,7 @@ impl Reach {
         let matrix = DMatrix::from_fn(equations.len(), size, |row, j| equations[row].0[j]);
         self.freedoms = null_space(&matrix).len();
         for (normal, value) in &equations {
-            self.space.region.equate(normal, *value);
+            self.search.region.add_equation(normal, *value);
         }
     }
 
@@ -194,12 +216,12 @@ impl Reach {
         if plan.width() == 2 || draw.shortest == draw.longest {
             return;
         }
-        let mut normal = unit(self.space.region.size(), 3 * i + 2);
-        if self.space.region.bound(&normal, bounds.longest(plan, i)) {
+        let mut normal = unit(self.search.region.size(), 3 * i + 2);
+        if self.search.region.add_bound(&normal, bounds.longest(plan, i)) {
             self.labels.0.push(format!("longest segment {i}"));
         }
         normal[3 * i + 2] = -1.0;
-        if self.space.region.bound(&normal, -draw.shortest) {
+        if self.search.region.add_bound(&normal, -draw.shortest) {
             self.labels.0.push(format!("shortest segment {i}"));
         }
     }
@@ -213,34 +235,34 @@ impl Reach {
         let scale = (plan.width() == 3).then_some(first + 2);
         // Without stretch the smaller of two circles is all there is.
         if radius < if scale.is_some() { f64::INFINITY } else { TURN } {
-            self.space.region.add_disc(Disc { first, radius, scale });
+            self.search.region.add_disc(Disc { first, radius, scale });
             self.labels.1.push(format!("curvature of segment {i}"));
             if scale.is_none() {
                 return;
             }
         }
-        self.space.region.add_disc(Disc { first, radius: TURN, scale: None });
+        self.search.region.add_disc(Disc { first, radius: TURN, scale: None });
         self.labels.1.push(format!("full turn of segment {i}"));
     }
 
     fn bound_displacements(&mut self, plan: &Plan, names: &[String]) {
         for (k, (lower, upper)) in self.ranges.iter().enumerate().filter(|(_, (l, u))| l < u) {
             let (mut row, at_rest) = displacement(plan, k);
-            if self.space.region.bound(&row, upper + at_rest) {
+            if self.search.region.add_bound(&row, upper + at_rest) {
                 self.labels.0.push(format!("release of '{}'", names[k]));
             }
             for entry in &mut row {
                 *entry = -*entry;
             }
-            if self.space.region.bound(&row, -lower - at_rest) {
+            if self.search.region.add_bound(&row, -lower - at_rest) {
                 self.labels.0.push(format!("pull of '{}'", names[k]));
             }
         }
     }
 
-    /// The bounds that hold a point back.
-    pub(super) fn holding(&self, point: &[f64]) -> Vec<&str> {
-        let (bounds, discs) = self.space.region.at_edge(point, 1e-9);
+    /// Names of the bounds that are active at a point.
+    pub(super) fn active_bounds(&self, point: &[f64]) -> Vec<&str> {
+        let (bounds, discs) = self.search.region.active_at(point, 1e-9);
         let bounds = bounds.into_iter().map(|k| self.labels.0[k].as_str());
         bounds.chain(discs.into_iter().map(|k| self.labels.1[k].as_str())).collect()
     }
@@ -303,7 +325,7 @@ impl Bounds {
         self.length.as_ref().map_or(STRETCH.1, |range| range.at(i).1 / rest)
     }
 
-    fn draw(&self, plan: &Plan, i: usize) -> Draw {
+    fn segment_range(&self, plan: &Plan, i: usize) -> SegmentRange {
         let rest = plan.segment(i).rest_length;
         let (shortest, longest) = match &self.length {
             Some(range) => ((range.at(i).0 / rest).max(SHORTEST), self.longest(plan, i)),
@@ -313,7 +335,7 @@ impl Bounds {
         let widest = TURN.min(self.largest_curvature(i) * rest * longest);
         // Without an upper bound, starts are drawn up to twice the default one.
         let longest = longest.min(2.0 * STRETCH.1 * shortest.max(1.0));
-        Draw { widest, shortest, longest }
+        SegmentRange { widest, shortest, longest }
     }
 
     /// Checks them for a rod.

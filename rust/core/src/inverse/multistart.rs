@@ -7,7 +7,7 @@ use crate::solve::pso::{PsoSettings, Swarm};
 use crate::status::Status;
 
 use super::Method;
-use super::bounds::Space;
+use super::bounds::SearchSpace;
 
 /// Ends of descents that are kept as candidates for the nearest point.
 const CANDIDATES: usize = 4;
@@ -15,25 +15,25 @@ const CANDIDATES: usize = 4;
 const POLISH: usize = 300;
 /// Steps that lower the energy.
 const LOWER: usize = 500;
-/// The same where derivatives jump.
+/// Steps that lower the energy where derivatives jump.
 const LOWER_KINKS: usize = 30;
 
 /// Buffers of a search, and the point it found.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Search<'a, const R: usize = 6> {
-    pub(super) fit: Scratch<R>,
+pub(super) struct Multistart<'a, const R: usize = 6> {
+    pub(super) solver: Scratch<R>,
     /// The unknowns found.
     pub(super) point: Vec<f64>,
     /// Ends the search before its next start when it is set.
     pub(super) stop: Option<&'a AtomicBool>,
     pub(super) swarm: Option<Swarm>,
-    /// Where descents ended that did not meet the target, by their squared residual, best first.
+    /// Ends of descents that did not meet the target, with their squared residuals, best first.
     pub(super) candidates: Vec<(f64, Vec<f64>)>,
 }
 
-/// How a search ended.
+/// Outcome of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Found {
+pub(super) struct SearchOutcome {
     pub(super) status: Status,
     pub(super) iterations: usize,
     pub(super) starts: usize,
@@ -42,126 +42,129 @@ pub(super) struct Found {
 /// Freedom that is spent on the energy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Freedom {
-    /// None is left, or it is not to be spent.
+    /// No freedom, or none to be spent.
     None,
     Smooth,
     /// Derivatives jump: the energy is least where no step leads lower.
     Kinked,
 }
 
-/// What to search for.
+/// Options of one search.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Effort<'s> {
+pub(super) struct SearchOptions<'s> {
     /// The first start, and how many.
     pub(super) first: usize,
     pub(super) starts: usize,
     pub(super) max_iterations: usize,
-    /// What the target leaves, to spend on the energy.
+    /// Freedom that the target leaves, to spend on the energy.
     pub(super) freedom: Freedom,
     pub(super) method: Method,
     /// No start beyond these is from a swarm.
     pub(super) swarms: usize,
     /// A swarm is the last resort.
     pub(super) fall_back: bool,
-    /// The nearest point is wanted where none meets the target.
+    /// True for the nearest point where none meets the target.
     pub(super) nearest: bool,
     pub(super) swarm: &'s PsoSettings,
 }
 
-impl<const R: usize> Search<'_, R> {
+impl<const R: usize> Multistart<'_, R> {
     /// Tries `start(k, point)` for one k after the other until a descent meets the target; else finds the point
     /// nearest to it. `point` holds the answer whatever the status, and was evaluated last.
     pub(super) fn run<P: Problem<R>>(
         &mut self,
         problem: &mut P,
-        space: &Space,
-        effort: Effort<'_>,
+        space: &SearchSpace,
+        options: SearchOptions<'_>,
         start: impl FnMut(usize, &mut Vec<f64>),
-    ) -> Found {
-        let (status, starts) = self.seek(problem, space, effort, start);
+    ) -> SearchOutcome {
+        let (status, starts) = self.try_starts(problem, space, options, start);
         if status != Status::Converged {
-            self.fit.evaluate(problem, &self.point);
+            self.solver.evaluate(problem, &self.point);
         }
-        Found { status, iterations: self.fit.iterations, starts }
+        SearchOutcome { status, iterations: self.solver.iterations, starts }
     }
 
-    /// How the search ended, and after how many starts.
-    fn seek<P: Problem<R>>(
+    /// Status of the search and the number of starts tried.
+    fn try_starts<P: Problem<R>>(
         &mut self,
         problem: &mut P,
-        space: &Space,
-        effort: Effort<'_>,
+        space: &SearchSpace,
+        options: SearchOptions<'_>,
         mut start: impl FnMut(usize, &mut Vec<f64>),
     ) -> (Status, usize) {
-        self.fit.iterations = 0;
+        self.solver.iterations = 0;
         self.candidates.clear();
         let mut descended = false;
-        for tried in 0..effort.starts {
-            if tried > 0 && self.stopped() {
+        for tried in 0..options.starts {
+            if tried > 0 && self.is_stopped() {
                 return (Status::IterationLimit, tried);
             }
-            let k = effort.first + tried;
+            // Start k, brought into the region: from the caller, or from a swarm.
+            let k = options.first + tried;
             if tried > 0 {
                 problem.restart();
             }
-            let inside = if effort.method == Method::Newton || k >= effort.swarms {
+            let inside = if options.method == Method::Newton || k >= options.swarms {
                 start(k, &mut self.point);
-                self.fit.restore(&space.region, &mut self.point)
+                self.solver.restore(&space.region, &mut self.point)
             } else {
-                self.settle(problem, space, effort.swarm, k)
+                self.swarm_start(problem, space, options.swarm, k)
             };
             if !inside {
                 // A start may be too far away to be brought back; the middle of the box is not.
-                if tried == 0 && !self.has_a_point(space) {
+                if tried == 0 && !self.find_inner_point(space) {
                     return (Status::Infeasible, 1);
                 }
                 continue;
             }
+            // A descent that meets the target ends the search.
             descended = true;
-            if let Some(status) = self.descend(problem, space, effort) {
+            if let Some(status) = self.descend(problem, space, options) {
                 return (status, tried + 1);
             }
         }
-        // A swarm looks where the starts did not, unless none of them had a value at all.
-        if effort.fall_back && !(descended && self.candidates.is_empty()) {
+        // A swarm searches where the starts did not, unless none of them had a value at all.
+        if options.fall_back && !(descended && self.candidates.is_empty()) {
             problem.restart();
-            if self.settle(problem, space, effort.swarm, 0)
-                && let Some(status) = self.descend(problem, space, effort)
+            if self.swarm_start(problem, space, options.swarm, 0)
+                && let Some(status) = self.descend(problem, space, options)
             {
-                return (status, effort.starts);
+                return (status, options.starts);
             }
         }
-        if !effort.nearest {
-            return (Status::Unreachable, effort.starts);
+        // Out of reach: the nearest point, from the best ends.
+        if !options.nearest {
+            return (Status::Unreachable, options.starts);
         }
-        (self.nearest(problem, space, effort), effort.starts)
+        (self.nearest(problem, space, options), options.starts)
     }
 
-    /// Whether the region has a point, which is then at hand.
-    fn has_a_point(&mut self, space: &Space) -> bool {
+    /// True when the region has a point, which is then the current one.
+    fn find_inner_point(&mut self, space: &SearchSpace) -> bool {
         self.point.clear();
         self.point.extend(space.lower.iter().zip(&space.upper).map(|(l, u)| 0.5 * (l + u)));
-        self.fit.restore(&space.region, &mut self.point)
+        self.solver.restore(&space.region, &mut self.point)
     }
 
-    /// Descends from the point at hand: the status if it meets the target.
+    /// Descends from the current point: the status if it meets the target.
     fn descend<P: Problem<R>>(
         &mut self,
         problem: &mut P,
-        space: &Space,
-        effort: Effort<'_>,
+        space: &SearchSpace,
+        options: SearchOptions<'_>,
     ) -> Option<Status> {
-        let limit = effort.max_iterations;
-        match self.fit.descend(problem, &space.region, &mut self.point, Purpose::Meet, limit) {
-            Ending::Met => return Some(self.spend_freedom(problem, space, effort)),
+        let limit = options.max_iterations;
+        match self.solver.descend(problem, &space.region, &mut self.point, Purpose::Meet, limit) {
+            Ending::Met => return Some(self.spend_freedom(problem, space, options)),
             Ending::Failed => {}
-            Ending::Stalled | Ending::IterationLimit => self.remember(),
+            Ending::Stalled | Ending::IterationLimit => self.keep_candidate(),
         }
         None
     }
 
-    /// Whether it was told to end.
-    pub(super) fn stopped(&self) -> bool {
+    /// True when the stop flag is set.
+    pub(super) fn is_stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 
@@ -169,24 +172,24 @@ impl<const R: usize> Search<'_, R> {
     fn spend_freedom<P: Problem<R>>(
         &mut self,
         problem: &mut P,
-        space: &Space,
-        effort: Effort<'_>,
+        space: &SearchSpace,
+        options: SearchOptions<'_>,
     ) -> Status {
-        let (kinks, most) = match effort.freedom {
+        let (kinks, most) = match options.freedom {
             Freedom::None => return Status::Converged,
             Freedom::Smooth => (false, LOWER),
             Freedom::Kinked => (true, LOWER_KINKS),
         };
-        match self.fit.lower_energy(problem, &space.region, &mut self.point, most) {
+        match self.solver.minimize_energy(problem, &space.region, &mut self.point, most) {
             Ending::Met => Status::Converged,
-            _ if kinks && problem.met(&self.fit.residual) => Status::Converged,
+            _ if kinks && problem.is_met(&self.solver.residual) => Status::Converged,
             _ => Status::IterationLimit,
         }
     }
 
     /// Keeps the point if it is among the best.
-    fn remember(&mut self) {
-        let squared = self.fit.residual.norm_squared();
+    fn keep_candidate(&mut self) {
+        let squared = self.solver.residual.norm_squared();
         let place = self.candidates.partition_point(|(other, _)| *other <= squared);
         if squared.is_finite() && place < CANDIDATES {
             self.candidates.truncate(CANDIDATES - 1);
@@ -198,18 +201,18 @@ impl<const R: usize> Search<'_, R> {
     fn nearest<P: Problem<R>>(
         &mut self,
         problem: &mut P,
-        space: &Space,
-        effort: Effort<'_>,
+        space: &SearchSpace,
+        options: SearchOptions<'_>,
     ) -> Status {
         let mut best: Option<(f64, Status, Vec<f64>)> = None;
         for (_, mut point) in std::mem::take(&mut self.candidates) {
             problem.restart();
             let ending =
-                self.fit.descend(problem, &space.region, &mut point, Purpose::Nearest, POLISH);
-            let squared = self.fit.residual.norm_squared();
+                self.solver.descend(problem, &space.region, &mut point, Purpose::Nearest, POLISH);
+            let squared = self.solver.residual.norm_squared();
             if ending == Ending::Met {
                 self.point = point;
-                return self.spend_freedom(problem, space, effort);
+                return self.spend_freedom(problem, space, options);
             }
             let status = match ending {
                 Ending::Stalled => Status::Unreachable,
@@ -218,14 +221,14 @@ impl<const R: usize> Search<'_, R> {
             let nearer = best.as_ref().is_none_or(|(least, _, _)| squared < *least);
             if squared.is_finite() && nearer {
                 // After a step that was refused.
-                self.fit.evaluate(problem, &point);
-                problem.keep();
+                self.solver.evaluate(problem, &point);
+                problem.save_state();
                 best = Some((squared, status, point));
             }
         }
         let Some((_, status, point)) = best else { return Status::NumericalError };
-        // Only to what this search kept: another one's balance would depend on the rows before.
-        problem.go_back();
+        // Restored only from this search: another one's equilibrium would depend on the rows before.
+        problem.restore_state();
         self.point = point;
         status
     }

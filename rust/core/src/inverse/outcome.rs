@@ -1,12 +1,34 @@
-//! How an inverse ended, and in words.
+//! Outcome of an inverse, and its message.
 
 use std::borrow::Borrow;
 
 use super::InverseSettings;
-use super::multistart::Found;
+use super::multistart::SearchOutcome;
 use crate::status::Status;
 
-/// How an inverse ended; what it found is in the workspace.
+/// Outcome of an inverse; the unknowns are in its buffers.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
+/// # use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// # let (bounds, settings) = (Bounds::default(), InverseSettings::default());
+/// # let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
+/// let mut scratch = inverse.scratch();
+/// // Twice as far as the robot is long.
+/// let answer = inverse.solve(&Target::Position(Vector3::new(0.0, 0.0, 0.4)), None, &mut scratch);
+/// assert_eq!(answer.status, tdcr::Status::Unreachable);
+/// assert!((answer.distance - 0.2).abs() < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Converged: the target is met, with the least bending energy nearby where there is freedom.
@@ -24,17 +46,17 @@ pub struct Answer {
 }
 
 impl Answer {
-    pub(super) fn of(found: Found, (distance, angle): (f64, f64)) -> Self {
-        let Found { status, iterations, starts } = found;
+    pub(super) fn of(found: SearchOutcome, (distance, angle): (f64, f64)) -> Self {
+        let SearchOutcome { status, iterations, starts } = found;
         Self { status, distance, angle, iterations, starts }
     }
 
-    /// Of a robot of which no shape was found.
-    pub(super) fn shapeless(found: Found) -> Self {
-        Self::of(Found { status: Status::Infeasible, ..found }, (f64::NAN, f64::NAN))
+    /// Answer for a robot of which no shape was found.
+    pub(super) fn without_shape(found: SearchOutcome) -> Self {
+        Self::of(SearchOutcome { status: Status::Infeasible, ..found }, (f64::NAN, f64::NAN))
     }
 
-    /// Of a target that was not sought.
+    /// Answer for a target that was not tried.
     pub(super) fn none() -> Self {
         Self {
             status: Status::NumericalError,
@@ -46,33 +68,33 @@ impl Answer {
     }
 }
 
-/// What stood in the way, in a sentence: the bounds that hold back, and what freedom is spent on.
-pub(super) fn tell<S: Borrow<str>>(
+/// Reason why a solve did not converge, in a sentence: the active bounds, and the freedom not yet spent.
+pub(super) fn message_of<S: Borrow<str>>(
     answer: &Answer,
     settings: &InverseSettings,
-    held: &[S],
+    active: &[S],
     least: &str,
 ) -> String {
     let Answer { distance, angle, .. } = *answer;
     let met = distance <= settings.position_tolerance && angle <= settings.rotation_tolerance;
     let angle = if angle > 0.0 { format!(" and {angle:.2e} rad") } else { String::new() };
     let off = format!("{distance:.2e} m{angle} off the target");
-    let held = if held.is_empty() {
+    let active = if active.is_empty() {
         String::new()
     } else {
-        format!("; at its bound: {}", held.join(", "))
+        format!("; at its bound: {}", active.join(", "))
     };
     match answer.status {
         Status::Converged => String::new(),
         Status::Unreachable => {
-            format!("the nearest answer of {} starts is {off}{held}", answer.starts)
+            format!("the nearest answer of {} starts is {off}{active}", answer.starts)
         }
         Status::Infeasible => "the bounds leave the robot no shape".to_owned(),
         Status::IterationLimit if met => {
             format!("the target is met, but not with the least {least} nearby")
         }
         Status::IterationLimit | Status::NumericalError => {
-            format!("stopped before a nearest answer was found: {off}{held}")
+            format!("stopped before a nearest answer was found: {off}{active}")
         }
     }
 }

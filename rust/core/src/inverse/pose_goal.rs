@@ -1,52 +1,52 @@
-//! The tool at a target, as what is wanted of a rod.
+//! Tool at a target, as the goal of a rod's inverse.
 
 use nalgebra::Vector6;
 
-use super::pose_residual::Aim;
-use super::tension_problem::Goal;
+use super::goal::Goal;
+use super::pose_residual::PoseResidual;
 use crate::rod::equilibrium::Motion;
 
-/// A target of the tool.
+/// Target pose of the tool.
 #[derive(Clone, Debug)]
-pub(super) struct ToolGoal<'a> {
-    pub(super) aim: Aim<'a>,
+pub(super) struct PoseGoal<'a> {
+    pub(super) pose_residual: PoseResidual<'a>,
     moved: Vec<f64>,
     turned: Vec<f64>,
 }
 
-impl<'a> ToolGoal<'a> {
-    pub(super) fn new(aim: Aim<'a>) -> Self {
-        Self { aim, moved: Vec::new(), turned: Vec::new() }
+impl<'a> PoseGoal<'a> {
+    pub(super) fn new(pose_residual: PoseResidual<'a>) -> Self {
+        Self { pose_residual, moved: Vec::new(), turned: Vec::new() }
     }
 }
 
-impl Goal<6> for ToolGoal<'_> {
-    fn place(&mut self, motion: &Motion) {
-        self.aim.place(motion.tool.translation, || motion.tool.rotation);
+impl Goal<6> for PoseGoal<'_> {
+    fn update(&mut self, motion: &Motion) {
+        self.pose_residual.update(motion.tool.translation, || motion.tool.rotation);
     }
 
-    fn write(
+    fn write_residual(
         &mut self,
         motion: &Motion,
         residual: &mut Vector6<f64>,
         jacobian: &mut [Vector6<f64>],
     ) {
-        *residual = self.aim.residual();
-        self.aim.write_columns(&motion.columns, jacobian);
+        *residual = self.pose_residual.residual();
+        self.pose_residual.write_jacobian(&motion.columns, jacobian);
     }
 
-    fn squared(&self) -> f64 {
-        self.aim.residual().norm_squared()
+    fn squared_norm(&self) -> f64 {
+        self.pose_residual.residual().norm_squared()
     }
 
-    fn met(&self, residual: &Vector6<f64>) -> bool {
-        self.aim.met(residual)
+    fn is_met(&self, residual: &Vector6<f64>) -> bool {
+        self.pose_residual.is_met(residual)
     }
 
-    fn curve(&mut self, motion: &mut Motion, weights: &Vector6<f64>, matrix: &mut [f64]) {
-        let Self { aim, moved, turned } = self;
-        let rotates = aim.rotates();
-        let push = aim.curvature(weights);
+    fn add_hessian(&mut self, motion: &mut Motion, weights: &Vector6<f64>, matrix: &mut [f64]) {
+        let Self { pose_residual, moved, turned } = self;
+        let rotates = pose_residual.rotates();
+        let push = pose_residual.curvature(weights);
         motion.curve(&push.force, &push.moment, moved, turned);
         let columns = &motion.columns;
         let size = columns.len();

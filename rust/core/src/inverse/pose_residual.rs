@@ -1,4 +1,4 @@
-//! The tool before a target: weighted residuals and their derivatives.
+//! Weighted residuals of the tool with respect to a target, and their derivatives.
 
 use nalgebra::{Matrix3, RowVector3, Vector3, Vector6};
 
@@ -6,15 +6,15 @@ use super::{InverseSettings, Target};
 use crate::lie::{Pose, so3};
 use crate::robot::Robot;
 
-/// How much of the robot's length one radian counts, unless it is said; and all of the tool.
+/// Default weight of one radian, as a share of the robot's length; the tool's reach is added to it.
 const RADIAN: f64 = 0.3;
 
 /// Velocity of the tool and angular velocity.
 pub(super) type Twist = (Vector3<f64>, Vector3<f64>);
 
-/// A target, and how far the tool is from it.
+/// Weighted residual of the tool's pose with respect to a target, in the frame of the base.
 #[derive(Clone, Debug)]
-pub(super) struct Aim<'a> {
+pub(super) struct PoseResidual<'a> {
     robot: &'a Robot,
     settings: &'a InverseSettings,
     target: Target,
@@ -23,17 +23,17 @@ pub(super) struct Aim<'a> {
     /// Weights of the residuals over the robot's reach: position along world axes, rotation about tool
     /// axes.
     weights: Vector6<f64>,
-    /// Place of the tool.
+    /// Position of the tool.
     pub(super) tool: Vector3<f64>,
     /// Rotation of the tool.
     rotation: Matrix3<f64>,
     /// Rotation from the tool to the target, tool axes.
     error: Vector3<f64>,
     /// From angular velocity (world axes) to the change of `error`, but for the sign.
-    back: Matrix3<f64>,
+    error_rate: Matrix3<f64>,
 }
 
-impl<'a> Aim<'a> {
+impl<'a> PoseResidual<'a> {
     pub(super) fn new(robot: &'a Robot, settings: &'a InverseSettings) -> Self {
         let tool = robot.tool().translation.norm();
         let reach = robot.backbone().total_length() + tool;
@@ -49,12 +49,12 @@ impl<'a> Aim<'a> {
             tool: Vector3::zeros(),
             rotation: Matrix3::identity(),
             error: Vector3::zeros(),
-            back: Matrix3::zeros(),
+            error_rate: Matrix3::zeros(),
         }
     }
 
-    /// Everything is in the frame of the base: the world's origin may be far away.
-    pub(super) fn at(&mut self, target: Target) {
+    /// Sets a target of the world. Residuals are in the frame of the base: the world's origin may be far away.
+    pub(super) fn set_target(&mut self, target: Target) {
         let world = self.robot.base().inverse();
         self.target = match target {
             Target::Position(position) => {
@@ -74,15 +74,15 @@ impl<'a> Aim<'a> {
         self.target
     }
 
-    /// How far a target is from a place of the tool, over the robot's length, and its angle \[rad\].
-    pub(super) fn way(&self, from: &Pose, to: &Target) -> f64 {
+    /// Distance from a pose of the tool to a target, over the robot's length, plus the angle \[rad\].
+    pub(super) fn relative_distance(&self, from: &Pose, to: &Target) -> f64 {
         let turn = |rotation| so3::log(&from.rotation.tr_mul(rotation)).norm();
         let off = (to.position() - from.translation).norm();
         off / self.robot.backbone().total_length() + to.rotation().map_or(0.0, turn)
     }
 
-    /// Aims at a share of the way from a place of the tool to a target, both in the base's frame.
-    pub(super) fn between(&mut self, from: &Pose, to: &Target, share: f64) {
+    /// Sets the target at a share of the way from a pose of the tool to another target, both in the base's frame.
+    pub(super) fn interpolate_target(&mut self, from: &Pose, to: &Target, share: f64) {
         if share >= 1.0 {
             self.target = *to;
             return;
@@ -93,59 +93,59 @@ impl<'a> Aim<'a> {
         };
     }
 
-    /// Whether the target has axes.
+    /// True when the target has axes.
     pub(super) fn rotates(&self) -> bool {
         self.target.rotation().is_some()
     }
 
     /// A vector in the axes that its weights are for.
-    fn weighed(&self, v: &Vector3<f64>) -> Vector3<f64> {
+    fn in_weight_axes(&self, v: &Vector3<f64>) -> Vector3<f64> {
         self.axes.map_or(*v, |axes| axes * v)
     }
 
-    /// Number of residuals that count.
-    pub(super) fn rows(&self) -> usize {
+    /// Number of residuals with a weight.
+    pub(super) fn row_count(&self) -> usize {
         let given = if self.rotates() { 6 } else { 3 };
         self.weights.iter().take(given).filter(|weight| **weight > 0.0).count()
     }
 
-    /// Distance \[m\] and angle \[rad\] by which the tool misses the target where it was placed last, over
+    /// Distance \[m\] and angle \[rad\] from the tool of the last update to the target, over
     /// the axes that count; 0 for the angle to a position.
-    pub(super) fn misses(&self) -> (f64, f64) {
+    pub(super) fn errors(&self) -> (f64, f64) {
         let counts = |weight: f64, value: f64| if weight > 0.0 { value * value } else { 0.0 };
-        let off = self.weighed(&(self.target.position() - self.tool));
+        let off = self.in_weight_axes(&(self.target.position() - self.tool));
         let sum = |offset: usize, v: &Vector3<f64>| {
             (0..3).map(|k| counts(self.weights[offset + k], v[k])).sum::<f64>().sqrt()
         };
         (sum(0, &off), if self.rotates() { sum(3, &self.error) } else { 0.0 })
     }
 
-    /// Places the tool, given in the base's frame.
-    pub(super) fn place(&mut self, point: Vector3<f64>, rotation: impl FnOnce() -> Matrix3<f64>) {
+    /// Updates the pose of the tool, given in the base's frame.
+    pub(super) fn update(&mut self, point: Vector3<f64>, rotation: impl FnOnce() -> Matrix3<f64>) {
         self.tool = point;
         if let Some(wanted) = self.target.rotation() {
             self.rotation = rotation();
             self.error = so3::log(&(self.rotation.transpose() * wanted));
-            self.back = so3::left_jacobian_inverse(&self.error) * self.rotation.transpose();
+            self.error_rate = so3::left_jacobian_inverse(&self.error) * self.rotation.transpose();
         }
     }
 
-    /// Residuals of the last placing.
+    /// Residuals of the last update.
     pub(super) fn residual(&self) -> Vector6<f64> {
-        let off = self.weighed(&(self.target.position() - self.tool));
+        let off = self.in_weight_axes(&(self.target.position() - self.tool));
         let turn = if self.rotates() { self.error } else { Vector3::zeros() };
         Vector6::new(off.x, off.y, off.z, turn.x, turn.y, turn.z).component_mul(&self.weights)
     }
 
-    /// Their derivatives by what moves the tool so.
-    pub(super) fn write_columns<'t>(
+    /// Derivatives of the residuals with respect to unknowns that move the tool with these twists.
+    pub(super) fn write_jacobian<'t>(
         &self,
         twists: impl IntoIterator<Item = &'t Twist>,
         jacobian: &mut [Vector6<f64>],
     ) {
         let (rotates, axes) = (self.rotates(), self.axes);
         for (column, (velocity, spin)) in jacobian.iter_mut().zip(twists) {
-            let turned = if rotates { self.back * spin } else { Vector3::zeros() };
+            let turned = if rotates { self.error_rate * spin } else { Vector3::zeros() };
             let velocity = axes.map_or(*velocity, |axes| axes * velocity);
             for k in 0..3 {
                 column[k] = -self.weights[k] * velocity[k];
@@ -154,8 +154,8 @@ impl<'a> Aim<'a> {
         }
     }
 
-    /// Whether residuals, not those of the last placing in every case, are within the tolerances.
-    pub(super) fn met(&self, residual: &Vector6<f64>) -> bool {
+    /// True when residuals, which need not be those of the last update, are within the tolerances.
+    pub(super) fn is_met(&self, residual: &Vector6<f64>) -> bool {
         let sum = |rows: std::ops::Range<usize>| {
             let counted = rows.filter(|k| self.weights[*k] > 0.0);
             counted.map(|k| (residual[k] / self.weights[k]).powi(2)).sum::<f64>().sqrt()
@@ -170,30 +170,32 @@ impl<'a> Aim<'a> {
         let force: Vector3<f64> = push.fixed_rows::<3>(0).into();
         let force = self.axes.map_or(force, |axes| axes.tr_mul(&force));
         let twist: Vector3<f64> = push.fixed_rows::<3>(3).into();
-        let moment = if self.rotates() { self.back.transpose() * twist } else { Vector3::zeros() };
-        Curvature { aim: self, force, moment, twist }
+        let moment =
+            if self.rotates() { self.error_rate.transpose() * twist } else { Vector3::zeros() };
+        Curvature { residual: self, force, moment, twist }
     }
 }
 
-/// What weights of the residuals push the tool by.
+/// Force and moment on the tool that weights of the residuals amount to.
 pub(super) struct Curvature<'t, 'a> {
-    aim: &'t Aim<'a>,
+    residual: &'t PoseResidual<'a>,
     /// Along the base's axes.
     pub(super) force: Vector3<f64>,
-    /// The same, as `back` carries it.
+    /// Moment along the base's axes.
     pub(super) moment: Vector3<f64>,
     /// About the tool's axes.
     twist: Vector3<f64>,
 }
 
 impl Curvature<'_, '_> {
-    /// What is needed of one unknown's spin for [`Self::rotation`].
+    /// Row of one unknown's angular velocity for [`Self::rotation`].
     pub(super) fn row(&self, spin: &Vector3<f64>) -> RowVector3<f64> {
-        let turned = self.aim.rotation.transpose() * spin;
-        self.twist.transpose() * so3::left_jacobian_inverse_derivative(&self.aim.error, &turned)
+        let turned = self.residual.rotation.transpose() * spin;
+        self.twist.transpose()
+            * so3::left_jacobian_inverse_derivative(&self.residual.error, &turned)
     }
 
-    /// The part of the rotation, of two unknowns by their spins, the row of the first, and the moment's work on the
+    /// Rotational part for two unknowns by their spins, the row of the first, and the moment's work on the
     /// change of the first one's spin by the other.
     pub(super) fn rotation(
         &self,
@@ -202,6 +204,6 @@ impl Curvature<'_, '_> {
         other: &Vector3<f64>,
         turned: f64,
     ) -> f64 {
-        turned - self.moment.dot(&other.cross(spin)) - (row * (self.aim.back * other))[0]
+        turned - self.moment.dot(&other.cross(spin)) - (row * (self.residual.error_rate * other))[0]
     }
 }

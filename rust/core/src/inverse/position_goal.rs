@@ -1,38 +1,38 @@
-//! The disks at wanted places, as what is wanted of a rod.
+//! Disks at given positions, as the goal of a rod's inverse.
 //!
 //! Of the residuals of many disks only their sum of squares and its derivatives count: with `[J r] = Q U`, those of
 //! the triangular U, one row more than there are tendons.
 
 use nalgebra::{DMatrix, SVector, Vector3};
 
-use super::tension_problem::Goal;
+use super::goal::Goal;
 use crate::rod::equilibrium::Motion;
 
-/// Wanted places of disks.
+/// Target positions of some of the disks.
 #[derive(Clone, Debug)]
-pub(super) struct PlacesGoal {
-    /// Disk, from 0 for the first beyond the base, and its place in the base's frame \[m\].
-    wanted: Vec<(usize, Vector3<f64>)>,
+pub(super) struct PositionGoal {
+    /// Disk, from 0 for the first beyond the base, and its target position in the base's frame \[m\].
+    targets: Vec<(usize, Vector3<f64>)>,
     /// Residual of a metre.
     scale: f64,
     /// Residuals whose squares sum up to its square are met.
     tolerance: f64,
-    /// From the disks to their places where the rod was looked at last \[m\].
-    off: Vec<Vector3<f64>>,
+    /// Offsets from the disks to their targets at the last update \[m\].
+    offsets: Vec<Vector3<f64>>,
     velocities: Vec<Vector3<f64>>,
     forces: Vec<Vector3<f64>>,
     second: Vec<f64>,
 }
 
-impl PlacesGoal {
-    /// Of a rod of a length, met when every disk is within a tolerance \[m\].
-    pub(super) fn new(wanted: Vec<(usize, Vector3<f64>)>, length: f64, tolerance: f64) -> Self {
-        let scale = 1.0 / (length * (wanted.len().max(1) as f64).sqrt());
+impl PositionGoal {
+    /// Goal of a rod of a length, met when every disk is within a tolerance \[m\].
+    pub(super) fn new(targets: Vec<(usize, Vector3<f64>)>, length: f64, tolerance: f64) -> Self {
+        let scale = 1.0 / (length * (targets.len().max(1) as f64).sqrt());
         Self {
-            wanted,
+            targets,
             scale,
             tolerance: tolerance * scale,
-            off: Vec::new(),
+            offsets: Vec::new(),
             velocities: Vec::new(),
             forces: Vec::new(),
             second: Vec::new(),
@@ -41,26 +41,26 @@ impl PlacesGoal {
 
     /// Largest and root mean square of the distances, and the disk of the largest, from 0 for the first beyond the
     /// base.
-    pub(super) fn misses(&self) -> (f64, f64, usize) {
+    pub(super) fn errors(&self) -> (f64, f64, usize) {
         let (mut most, mut sum, mut disk) = (0.0, 0.0, 0);
-        for ((own, _), off) in self.wanted.iter().zip(&self.off) {
-            let distance = off.norm();
+        for ((own, _), offsets) in self.targets.iter().zip(&self.offsets) {
+            let distance = offsets.norm();
             sum += distance * distance;
             if distance > most {
                 (most, disk) = (distance, *own);
             }
         }
-        (most, (sum / self.wanted.len().max(1) as f64).sqrt(), disk)
+        (most, (sum / self.targets.len().max(1) as f64).sqrt(), disk)
     }
 }
 
-impl<const R: usize> Goal<R> for PlacesGoal {
-    fn place(&mut self, motion: &Motion) {
-        self.off.clear();
-        self.off.extend(self.wanted.iter().map(|(disk, place)| place - motion.disks[*disk]));
+impl<const R: usize> Goal<R> for PositionGoal {
+    fn update(&mut self, motion: &Motion) {
+        self.offsets.clear();
+        self.offsets.extend(self.targets.iter().map(|(disk, place)| place - motion.disks[*disk]));
     }
 
-    fn write(
+    fn write_residual(
         &mut self,
         motion: &Motion,
         residual: &mut SVector<f64, R>,
@@ -68,12 +68,12 @@ impl<const R: usize> Goal<R> for PlacesGoal {
     ) {
         motion.write_velocities(&mut self.velocities);
         let count = jacobian.len();
-        let all = DMatrix::from_fn(3 * self.wanted.len(), count + 1, |row, column| {
+        let all = DMatrix::from_fn(3 * self.targets.len(), count + 1, |row, column| {
             let i = row / 3;
             let value = if column < count {
-                -self.velocities[self.wanted[i].0 * count + column]
+                -self.velocities[self.targets[i].0 * count + column]
             } else {
-                self.off[i]
+                self.offsets[i]
             };
             self.scale * value[row % 3]
         });
@@ -86,21 +86,21 @@ impl<const R: usize> Goal<R> for PlacesGoal {
         }
     }
 
-    fn squared(&self) -> f64 {
-        self.off.iter().map(|off| (self.scale * off).norm_squared()).sum()
+    fn squared_norm(&self) -> f64 {
+        self.offsets.iter().map(|offsets| (self.scale * offsets).norm_squared()).sum()
     }
 
-    fn met(&self, residual: &SVector<f64, R>) -> bool {
+    fn is_met(&self, residual: &SVector<f64, R>) -> bool {
         residual.norm() <= self.tolerance
     }
 
-    /// Only for the residuals of the last placing as weights, which is what a sum of squares asks for.
-    fn curve(&mut self, motion: &mut Motion, _: &SVector<f64, R>, matrix: &mut [f64]) {
+    /// Second derivatives with the residuals of the last update as weights, as a sum of squares needs them.
+    fn add_hessian(&mut self, motion: &mut Motion, _: &SVector<f64, R>, matrix: &mut [f64]) {
         let count = motion.columns.len();
         self.forces.clear();
         self.forces.resize(motion.disks.len(), Vector3::zeros());
-        for ((disk, _), off) in self.wanted.iter().zip(&self.off) {
-            self.forces[*disk] = off * -self.scale * self.scale;
+        for ((disk, _), offsets) in self.targets.iter().zip(&self.offsets) {
+            self.forces[*disk] = offsets * -self.scale * self.scale;
         }
         motion.curve_places(&self.forces, &mut self.second);
         for a in 0..count {

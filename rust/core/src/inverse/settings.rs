@@ -1,15 +1,21 @@
-//! How precisely, how long and with which weights an inverse is sought.
+//! Settings of an inverse: tolerances, weights, starts, budgets.
 
 use crate::error::{InvalidInput, positive};
 use crate::solve::pso::PsoSettings;
 
-/// Where descents start.
+/// Source of the starts of descents.
+///
+/// ```
+/// use tdcr::inverse::Method;
+///
+/// assert_eq!(Method::ALL.map(Method::as_str), ["newton", "pso"]);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Method {
     /// From given, guessed and random points; a swarm is the last resort.
     #[default]
     Newton,
-    /// From where particle swarms settle.
+    /// From the best points of particle swarms.
     Swarm,
 }
 
@@ -28,6 +34,18 @@ impl Method {
 }
 
 /// Choices of an inverse.
+///
+/// ```
+/// use tdcr::inverse::InverseSettings;
+///
+/// // The tool's roll about its own z axis does not matter.
+/// let settings = InverseSettings {
+///     rotation_weight: [None, None, Some(0.0)],
+///     starts: 20,
+///     ..InverseSettings::default()
+/// };
+/// assert!(settings.validate().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseSettings {
     /// Distance to the target that counts as reached \[m\].
@@ -36,14 +54,14 @@ pub struct InverseSettings {
     pub rotation_tolerance: f64,
     /// Weight of the distance along each world axis; 0 leaves it out.
     pub position_weight: [f64; 3],
-    /// What one radian about each tool axis counts \[m\]; 0 leaves the axis free; default 0.3 of the
+    /// Weight of one radian about each tool axis \[m\]; 0 leaves the axis free; default 0.3 of the
     /// robot's length.
     pub rotation_weight: [Option<f64>; 3],
-    /// Where descents start.
+    /// Source of the starts of descents.
     pub method: Method,
     /// The swarms, if there are any. They minimise the squared weighted miss over the robot's length.
     pub swarm: PsoSettings,
-    /// Whether freedom that the target leaves goes to the least bending energy; else the answer is the
+    /// True to spend freedom that the target leaves on the least bending energy; else the answer is the
     /// one nearest to its start, as a path without jumps needs it.
     pub least_energy: bool,
     /// Starts at most before the target counts as out of reach.

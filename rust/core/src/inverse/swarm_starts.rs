@@ -1,11 +1,11 @@
-//! A particle swarm over the unknowns: starts for descents from wherever it settles.
+//! Particle swarms over the unknowns: starts of descents from their best points.
 
 use std::convert::Infallible;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::bounds::Space;
-use super::multistart::Search;
-use crate::solve::convex_region::{Region, Restoring};
+use super::bounds::SearchSpace;
+use super::multistart::Multistart;
+use crate::solve::convex_region::{Region, RestoreScratch};
 use crate::solve::levenberg_marquardt::Problem;
 use crate::solve::pso::{Objective, Progress, PsoSettings, Swarm};
 
@@ -14,7 +14,7 @@ use crate::solve::pso::{Objective, Progress, PsoSettings, Swarm};
 struct Cost<'a, F> {
     squared: F,
     region: &'a Region,
-    inside: Restoring,
+    inside: RestoreScratch,
     point: Vec<f64>,
     stop: Option<&'a AtomicBool>,
 }
@@ -31,7 +31,7 @@ impl<F: FnMut(&[f64]) -> f64> Objective for Cost<'_, F> {
         for (value, place) in values.iter_mut().zip(points.chunks_exact(size)) {
             self.point.clear();
             self.point.extend_from_slice(place);
-            // A value that is left out is none.
+            // A value that is not written counts as none.
             if self.region.restore(&mut self.point, &mut self.inside) {
                 let way = self.point.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
                 *value = (self.squared)(&self.point) + way;
@@ -45,12 +45,12 @@ impl<F: FnMut(&[f64]) -> f64> Objective for Cost<'_, F> {
     }
 }
 
-impl<const R: usize> Search<'_, R> {
-    /// Puts the place where a swarm settles into `point`, inside the region; false when it found none.
-    pub(super) fn settle<P: Problem<R>>(
+impl<const R: usize> Multistart<'_, R> {
+    /// Runs a swarm and puts its best point, brought into the region, into `point`; false when it found none.
+    pub(super) fn swarm_start<P: Problem<R>>(
         &mut self,
         problem: &mut P,
-        space: &Space,
+        space: &SearchSpace,
         settings: &PsoSettings,
         round: usize,
     ) -> bool {
@@ -60,15 +60,15 @@ impl<const R: usize> Search<'_, R> {
         let Some(swarm) = &mut self.swarm else { return false };
         swarm.reseed(settings.seed.wrapping_add(round as u64));
         let mut cost = Cost {
-            squared: |z: &[f64]| problem.squared(z),
+            squared: |z: &[f64]| problem.squared_norm(z),
             region: &space.region,
-            inside: Restoring::default(),
+            inside: RestoreScratch::default(),
             point: Vec::new(),
             stop: self.stop,
         };
         let Ok(report) = swarm.run(&mut cost);
         self.point.clear();
         self.point.extend_from_slice(swarm.best());
-        report.value.is_finite() && self.fit.restore(&space.region, &mut self.point)
+        report.value.is_finite() && self.solver.restore(&space.region, &mut self.point)
     }
 }

@@ -1,132 +1,113 @@
-//! The rod before what is wanted of it: residuals by the tensions, bounds on displacements, the sum of squared
+//! Goal of a rod as a least-squares problem in the tensions: residuals, bounds on displacements, the sum of squared
 //! tensions.
 
 use nalgebra::SVector;
 
-use crate::rod::equilibrium::{Equilibrium, Motion};
+use crate::rod::equilibrium::Equilibrium;
 use crate::solve::levenberg_marquardt::Problem;
 use crate::solve::quadratic_program::Rows;
+use crate::status::Status;
 
-use super::pose_goal::ToolGoal;
-
-/// What is wanted of a rod: residuals at a balance, and their derivatives by the tensions.
-pub(super) trait Goal<const R: usize> {
-    /// Looks at where the rod is.
-    fn place(&mut self, motion: &Motion);
-
-    /// Residuals of the last placing and their derivatives.
-    fn write(
-        &mut self,
-        motion: &Motion,
-        residual: &mut SVector<f64, R>,
-        jacobian: &mut [SVector<f64, R>],
-    );
-
-    /// The squared residuals of the last placing.
-    fn squared(&self) -> f64;
-
-    /// Whether residuals, not those of the last placing in every case, are as small as wanted.
-    fn met(&self, residual: &SVector<f64, R>) -> bool;
-
-    /// Adds the second derivatives of `weights . r` by the tensions to the lower triangle of a matrix.
-    fn curve(&mut self, motion: &mut Motion, weights: &SVector<f64, R>, matrix: &mut [f64]);
-}
+use super::goal::Goal;
+use super::multistart::{Multistart, SearchOutcome};
+use super::outcome::Answer;
+use super::pose_goal::PoseGoal;
 
 /// Unknowns: tensions in such units that each is about the angle by which it bends the rod alone \[rad\].
 #[derive(Debug)]
-pub(super) struct Pull<'a, G = ToolGoal<'a>> {
+pub(super) struct TensionProblem<'a, G = PoseGoal<'a>> {
     pub(super) rod: Box<dyn Equilibrium + 'a>,
-    pub(super) aim: G,
+    pub(super) goal: G,
     /// Tension of a unit of every unknown.
     units: &'a [f64],
     /// Lowest and highest displacement of every tendon \[m\].
     ranges: &'a [(f64, f64)],
     /// Length of every tendon at rest, which violations are measured by \[m\].
-    lengths: &'a [f64],
-    bounded: bool,
-    /// What tendons without tension are let out by, so that rounding does not lock those that depend on each other \[m\].
-    pub(super) hair: f64,
+    rest_lengths: &'a [f64],
+    has_bounds: bool,
+    /// Length by which slack tendons are let out, so that rounding does not lock those that depend on each other \[m\].
+    pub(super) slack_allowance: f64,
     tensions: Vec<f64>,
-    /// The point evaluated last is a balance.
-    sound: bool,
+    /// The point evaluated last is an equilibrium.
+    balanced: bool,
     second: Vec<f64>,
 }
 
 /// Second derivatives that are nearly right lead to a gradient of this precision in few steps.
 const PRECISION: f64 = 1e-6;
-/// Place of the balance nearest to what is wanted, among those that are kept.
+/// Slot of the equilibrium nearest to the goal, among those that are kept.
 const NEAREST: usize = 2;
-/// A tendon pulls no more than this: it has no tension \[rad\].
+/// Largest unknown of a slack tendon \[rad\].
 const SLACK: f64 = 1e-9;
 
-impl<'a, G> Pull<'a, G> {
+impl<'a, G> TensionProblem<'a, G> {
     pub(super) fn new(
         rod: Box<dyn Equilibrium + 'a>,
-        aim: G,
-        lengths: &'a [f64],
+        goal: G,
+        rest_lengths: &'a [f64],
         units: &'a [f64],
         ranges: &'a [(f64, f64)],
     ) -> Self {
         let finite = |(lower, upper): &(f64, f64)| lower.is_finite() || upper.is_finite();
         Self {
             rod,
-            aim,
+            goal,
             units,
             ranges,
-            lengths,
-            bounded: ranges.iter().any(finite),
-            hair: 0.0,
+            rest_lengths,
+            has_bounds: ranges.iter().any(finite),
+            slack_allowance: 0.0,
             tensions: Vec::new(),
-            sound: false,
+            balanced: false,
             second: Vec::new(),
         }
     }
 
-    /// Goes to the balance under the tensions of a point and looks at it.
-    fn place<const R: usize>(&mut self, z: &[f64]) -> bool
+    /// Moves the rod to the equilibrium under the tensions of a point and updates the goal; false when there is none.
+    fn move_to<const R: usize>(&mut self, z: &[f64]) -> bool
     where
         G: Goal<R>,
     {
         // Rounding leaves no tension below zero.
         let tension = |(z, unit): (&f64, &f64)| (z * unit).max(0.0);
         let wanted = z.iter().zip(self.units).map(tension);
-        if !(self.sound && wanted.clone().eq(self.tensions.iter().copied())) {
+        if !(self.balanced && wanted.clone().eq(self.tensions.iter().copied())) {
             self.tensions.clear();
             self.tensions.extend(wanted);
-            self.sound = self.rod.go(&self.tensions);
-            if self.sound {
+            self.balanced = self.rod.go(&self.tensions);
+            if self.balanced {
                 self.rod.differentiate();
             }
         }
-        if self.sound {
-            self.aim.place(self.rod.motion());
+        if self.balanced {
+            self.goal.update(self.rod.motion());
         }
-        self.sound
+        self.balanced
     }
 
-    /// Displacements at hand \[m\]; rounding leaves none outside its bounds.
+    /// Displacements at the equilibrium \[m\]; rounding leaves none outside its bounds.
     pub(super) fn write_displacements(&self, place: &mut [f64]) {
         for (k, (displacement, (lower, upper))) in place.iter_mut().zip(self.ranges).enumerate() {
-            // Where an obstacle's function failed before the first balance there are none.
+            // There are none where an obstacle's function failed before the first equilibrium.
             let own = self.rod.tensions().get(k);
             let slack = own.is_some_and(|tension| *tension <= SLACK * self.units[k]);
-            let hair = if slack { self.hair } else { 0.0 };
-            *displacement = (self.rod.displacement(k) + hair).max(*lower).min(*upper);
+            let slack_allowance = if slack { self.slack_allowance } else { 0.0 };
+            *displacement = (self.rod.displacement(k) + slack_allowance).max(*lower).min(*upper);
         }
     }
 
-    /// Whether the point evaluated last is a balance.
-    pub(super) fn sound(&self) -> bool {
-        self.sound
+    /// True when the point evaluated last is an equilibrium.
+    pub(super) fn balanced(&self) -> bool {
+        self.balanced
     }
 
-    /// Forgets the point evaluated last: the rod is put elsewhere.
+    /// Invalidates the point evaluated last: the rod is moved elsewhere.
     pub(super) fn forget(&mut self) {
-        self.sound = false;
+        self.balanced = false;
     }
 
-    /// Bounds on displacements that hold the point evaluated last back: a tendon, and whether its release is.
-    pub(super) fn holding(&self, within: f64) -> Vec<(usize, bool)> {
+    /// Bounds on displacements that are active at the point evaluated last: a tendon, and true for its release.
+    pub(super) fn active_bounds(&self, within: f64) -> Vec<(usize, bool)> {
         let mut out = Vec::new();
         for (k, (lower, upper)) in self.ranges.iter().enumerate() {
             let displacement = self.rod.displacement(k);
@@ -141,37 +122,37 @@ impl<'a, G> Pull<'a, G> {
     }
 }
 
-impl<const R: usize, G: Goal<R>> Problem<R> for Pull<'_, G> {
+impl<const R: usize, G: Goal<R>> Problem<R> for TensionProblem<'_, G> {
     fn evaluate(
         &mut self,
         z: &[f64],
         residual: &mut SVector<f64, R>,
         jacobian: &mut [SVector<f64, R>],
     ) {
-        if !self.place::<R>(z) {
-            // No balance there: a step is not taken.
+        if !self.move_to::<R>(z) {
+            // Without an equilibrium the step is refused.
             residual.fill(f64::NAN);
             return;
         }
-        self.aim.write(self.rod.motion(), residual, jacobian);
+        self.goal.write_residual(self.rod.motion(), residual, jacobian);
         jacobian.iter_mut().zip(self.units).for_each(|(column, unit)| *column *= *unit);
     }
 
-    fn squared(&mut self, z: &[f64]) -> f64 {
+    fn squared_norm(&mut self, z: &[f64]) -> f64 {
         // What is infinite is no value, to a swarm.
-        if self.place::<R>(z) { self.aim.squared() } else { f64::INFINITY }
+        if self.move_to::<R>(z) { self.goal.squared_norm() } else { f64::INFINITY }
     }
 
-    fn met(&self, residual: &SVector<f64, R>) -> bool {
-        self.aim.met(residual)
+    fn is_met(&self, residual: &SVector<f64, R>) -> bool {
+        self.goal.is_met(residual)
     }
 
     fn add_hessian(&mut self, z: &[f64], weights: &SVector<f64, R>, hessian: &mut [f64]) {
         let size = z.len();
-        let Self { rod, aim, second, units, .. } = self;
+        let Self { rod, goal, second, units, .. } = self;
         second.clear();
         second.resize(size * size, 0.0);
-        aim.curve(rod.motion_mut(), weights, second);
+        goal.add_hessian(rod.motion_mut(), weights, second);
         for a in 0..size {
             for b in 0..=a {
                 hessian[a * size + b] += units[a] * units[b] * second[a * size + b];
@@ -184,21 +165,21 @@ impl<const R: usize, G: Goal<R>> Problem<R> for Pull<'_, G> {
         self.forget();
     }
 
-    fn keep(&mut self) {
+    fn save_state(&mut self) {
         self.rod.keep(NEAREST);
     }
 
-    fn go_back(&mut self) {
+    fn restore_state(&mut self) {
         self.rod.go_back(NEAREST);
         self.forget();
     }
 
-    fn bounded(&self) -> bool {
-        self.bounded
+    fn has_bounds(&self) -> bool {
+        self.has_bounds
     }
 
     fn linearize(&self, rows: &mut Rows) {
-        if !self.sound {
+        if !self.balanced {
             return;
         }
         let size = self.units.len();
@@ -219,10 +200,10 @@ impl<const R: usize, G: Goal<R>> Problem<R> for Pull<'_, G> {
     }
 
     fn violation(&self) -> f64 {
-        if !(self.bounded && self.sound) {
+        if !(self.has_bounds && self.balanced) {
             return 0.0;
         }
-        let rows = self.ranges.iter().zip(self.lengths).enumerate();
+        let rows = self.ranges.iter().zip(self.rest_lengths).enumerate();
         rows.fold(0.0, |most, (k, ((lower, upper), length))| {
             let displacement = self.rod.displacement(k);
             most.max((displacement - upper).max(lower - displacement) / length)
@@ -252,11 +233,30 @@ impl<const R: usize, G: Goal<R>> Problem<R> for Pull<'_, G> {
     }
 }
 
-impl<G> Pull<'_, G> {
+impl<G> TensionProblem<'_, G> {
     /// Mean square of the units: the energy is then of order 1.
     fn scale(&self) -> f64 {
         self.units.iter().map(|unit| unit * unit).sum::<f64>() / self.units.len().max(1) as f64
     }
+}
+
+/// Outcome of a search whose point is evaluated once more; `errors` measures distance \[m\] and angle \[rad\] there.
+pub(super) fn evaluate_answer<const R: usize, G: Goal<R>>(
+    mut found: SearchOutcome,
+    problem: &mut TensionProblem<'_, G>,
+    search: &mut Multistart<'_, R>,
+    errors: impl FnOnce(&G) -> (f64, f64),
+) -> Answer {
+    let failed = found.status == Status::NumericalError && !search.is_stopped();
+    if failed && Problem::<R>::violation(problem) > 0.0 {
+        // No start could be brought inside.
+        found.status = Status::Infeasible;
+    }
+    search.solver.evaluate(problem, &search.point);
+    if failed && !problem.balanced() {
+        return Answer::without_shape(found);
+    }
+    Answer::of(found, errors(&problem.goal))
 }
 
 #[cfg(test)]
@@ -268,7 +268,7 @@ mod tests {
     use super::super::Target;
     use super::super::batch::Inverter;
     use super::super::bounds::Bounds;
-    use super::super::position_goal::PlacesGoal;
+    use super::super::position_goal::PositionGoal;
     use super::super::rod::RodInverse;
     use super::*;
     use crate::lie::{Pose, so3};
@@ -305,16 +305,19 @@ mod tests {
             let bounds = Bounds::default();
             let inverse = RodInverse::new(&robot, &plan, &bounds, settings).unwrap();
             let mut work = inverse.buffers(None);
-            let pull = &mut work.pull;
+            let problem = &mut work.problem;
             let turn = so3::exp(&Vector3::new(0.5, -0.3, 0.2));
             let translation = Vector3::new(0.05, 0.02, 0.15);
-            pull.aim.aim.at(Target::Pose(Pose { rotation: turn, translation }));
-            check(pull, &[0.9, 0.5, 0.0, 0.7], share, (1e-4, 1e-6));
+            problem
+                .goal
+                .pose_residual
+                .set_target(Target::Pose(Pose { rotation: turn, translation }));
+            check(problem, &[0.9, 0.5, 0.0, 0.7], share, (1e-4, 1e-6));
         }
     }
 
-    /// The same where it leans on a ball, under weight and a force and moment at the tip. What
-    /// leaning bends is left out of the second derivatives: they are not looked at.
+    /// Derivatives where the rod leans on a ball, under weight and a force and moment at the tip. What
+    /// contact bends is not in the second derivatives: they are not compared.
     #[test]
     fn derivatives_agree_with_differences_in_contact() {
         let settings = InverseSettings::default();
@@ -335,19 +338,20 @@ mod tests {
             let inverse = RodInverse::new(&robot, &plan, &bounds, settings).unwrap();
             let inverse = inverse.among(&scene).unwrap();
             let mut work = inverse.buffers(None);
-            let pull = &mut work.pull;
-            pull.aim.aim.at(Target::Position(Vector3::new(0.05, 0.02, 0.15)));
+            let problem = &mut work.problem;
+            problem.goal.pose_residual.set_target(Target::Position(Vector3::new(0.05, 0.02, 0.15)));
             let z = [0.9, 0.5, 0.0, 0.7];
             // Shapes are balanced to 5e-11 rad.
-            check(pull, &z, f64::INFINITY, (1e-3, 3e-6));
-            let tensions: Vec<f64> = z.iter().zip(pull.units).map(|(z, unit)| z * unit).collect();
-            assert!(pull.rod.go(&tensions));
-            let contacts = pull.rod.state().unwrap().contacts;
+            check(problem, &z, f64::INFINITY, (1e-3, 3e-6));
+            let tensions: Vec<f64> =
+                z.iter().zip(problem.units).map(|(z, unit)| z * unit).collect();
+            assert!(problem.rod.go(&tensions));
+            let contacts = problem.rod.state().unwrap().contacts;
             assert!(contacts.iter().any(|c| c.force.norm() > 0.0));
         }
     }
 
-    /// Of the sum of squares over wanted places of some of the disks: its slope and, but for how tensions change the
+    /// Sum of squares over target positions of some of the disks: its slope and, but for how tensions change the
     /// stiffness, its second derivatives.
     #[test]
     fn derivatives_of_places_agree_with_differences() {
@@ -361,19 +365,19 @@ mod tests {
             let s = 0.2 * (i + 1) as f64 / 6.0;
             (8 * i + 7, Vector3::new(0.3 * s, -0.4 * s, 0.8 * s))
         });
-        let goal = PlacesGoal::new(wanted.collect(), 0.2, 1e-10);
-        let Pull { units, ranges, lengths, rod, .. } = work.pull;
-        let mut pull = Pull::new(rod, goal, lengths, units, ranges);
+        let goal = PositionGoal::new(wanted.collect(), 0.2, 1e-10);
+        let TensionProblem { units, ranges, rest_lengths, rod, .. } = work.problem;
+        let mut problem = TensionProblem::new(rod, goal, rest_lengths, units, ranges);
         let mut at = |z: &[f64]| {
             let (mut residual, mut jacobian) =
                 (SVector::<f64, 8>::zeros(), vec![SVector::<f64, 8>::zeros(); 4]);
-            pull.evaluate(z, &mut residual, &mut jacobian);
-            let squared = Problem::<8>::squared(&mut pull, z);
+            problem.evaluate(z, &mut residual, &mut jacobian);
+            let squared = Problem::<8>::squared_norm(&mut problem, z);
             assert!((residual.norm_squared() - squared).abs() < 1e-15);
             let slope: Vec<f64> = jacobian.iter().map(|column| column.dot(&residual)).collect();
             let mut hessian: Vec<f64> =
                 (0..16).map(|i| jacobian[i / 4].dot(&jacobian[i % 4])).collect();
-            pull.add_hessian(z, &residual, &mut hessian);
+            problem.add_hessian(z, &residual, &mut hessian);
             (0.5 * squared, slope, hessian)
         };
         let (z, h) = ([0.9, 0.5, 0.3, 0.7], 1e-4);
@@ -397,15 +401,16 @@ mod tests {
     }
 
     /// Steps of `h`, differences right to `near`.
-    fn check(pull: &mut Pull<'_>, z: &[f64], share: f64, (h, near): (f64, f64)) {
+    fn check(problem: &mut TensionProblem<'_>, z: &[f64], share: f64, (h, near): (f64, f64)) {
         let weights = Vector6::new(0.3, -0.7, 0.5, 0.4, 0.2, -0.6);
         let mut at = |z: &[f64]| {
             let (mut residual, mut jacobian) = (Vector6::zeros(), vec![Vector6::zeros(); 4]);
-            pull.evaluate(z, &mut residual, &mut jacobian);
+            problem.evaluate(z, &mut residual, &mut jacobian);
             let mut hessian = vec![0.0; 16];
-            pull.add_hessian(z, &weights, &mut hessian);
-            let own: Vec<f64> = (0..4).map(|k| pull.rod.displacement(k)).collect();
-            let slope = |k: usize, j: usize| pull.rod.displacement_slope(k, j) * pull.units[j];
+            problem.add_hessian(z, &weights, &mut hessian);
+            let own: Vec<f64> = (0..4).map(|k| problem.rod.displacement(k)).collect();
+            let slope =
+                |k: usize, j: usize| problem.rod.displacement_slope(k, j) * problem.units[j];
             let slopes: Vec<f64> = (0..16).map(|i| slope(i / 4, i % 4)).collect();
             (residual, jacobian, hessian, own, slopes)
         };

@@ -60,7 +60,7 @@ impl Angle {
         Self::of_square(w.norm_squared())
     }
 
-    /// Of the squared angle.
+    /// Coefficients at a squared angle.
     pub(crate) fn of_square(x: f64) -> Self {
         let half = 0.5 * x.sqrt();
         let (sin, half_cos) = half.sin_cos();

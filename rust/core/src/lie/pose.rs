@@ -8,6 +8,17 @@ use super::so3;
 ///
 /// A rotation matrix, not a quaternion: chains of frames are composed and applied to points far
 /// more often than they are renormalised.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::lie::{Pose, so3};
+///
+/// let rotation = so3::exp(&Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
+/// let frame = Pose { rotation, translation: Vector3::new(1.0, 0.0, 0.0) };
+/// assert!((frame.transform(&Vector3::x()) - Vector3::new(1.0, 1.0, 0.0)).norm() < 1e-15);
+/// let back = frame.compose(&frame.inverse());
+/// assert!(back.translation.norm() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Axes of the inner frame as columns, in the outer frame.

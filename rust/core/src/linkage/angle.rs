@@ -39,7 +39,7 @@ impl SquaredAngle {
     /// From `z` in [0, 4].
     #[inline]
     pub(super) fn from_squared_distance(z: f64) -> Self {
-        if z < SERIES_BELOW { Self::series(z) } else { Self::closed(z) }
+        if z < SERIES_BELOW { Self::series(z) } else { Self::closed_form(z) }
     }
 
     /// `4 asin(x/2)^2 = 2 sum x^(2n) / (n^2 binom(2n, n))`: terms fall like (z/4)^n.
@@ -56,7 +56,7 @@ impl SquaredAngle {
         Self { value: (value * z + 1.0) * z, first: first * z + 1.0, second }
     }
 
-    fn closed(z: f64) -> Self {
+    fn closed_form(z: f64) -> Self {
         let half = (0.5 * z.sqrt()).min(1.0);
         let angle = 2.0 * half.asin();
         let cosine = 1.0 - 0.5 * z;
@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn series_meets_closed_form() {
         for z in [0.03, 0.0599, 0.06, 0.07] {
-            let (s, c) = (SquaredAngle::series(z), SquaredAngle::closed(z));
+            let (s, c) = (SquaredAngle::series(z), SquaredAngle::closed_form(z));
             assert!((s.value - c.value).abs() < 1e-15, "{z}");
             assert!((s.first - c.first).abs() < 4e-15, "{z}");
             assert!((s.second - c.second).abs() < 2e-13, "{z}");

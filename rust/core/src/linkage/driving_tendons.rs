@@ -6,7 +6,7 @@ use crate::robot::Robot;
 
 /// The tendons of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Drive {
+pub(super) enum DrivingTendons {
     /// None is pulled.
     None,
     /// One: a four-bar linkage.
@@ -15,8 +15,8 @@ pub(super) enum Drive {
     Two(usize, usize),
 }
 
-impl Drive {
-    /// Whether a tendon is part of the linkage.
+impl DrivingTendons {
+    /// True when a tendon is part of the linkage.
     pub(super) fn contains(self, tendon: usize) -> bool {
         match self {
             Self::None => false,
@@ -31,13 +31,13 @@ impl Drive {
 pub(super) struct Run {
     pub(super) first: usize,
     pub(super) last: usize,
-    /// How each pair of tendons stands, tendon by tendon.
-    pairs: Vec<Stand>,
+    /// Relative azimuth of each pair of tendons, tendon by tendon.
+    pairs: Vec<RelativeAzimuth>,
 }
 
-/// How the holes of two tendons stand to each other on the disks of a run.
+/// Relative azimuth of the holes of two tendons on the disks of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stand {
+enum RelativeAzimuth {
     /// On different lines through the centre on every disk: they can form a seven-bar.
     Apart,
     /// On (nearly) the same azimuth on some disk.
@@ -63,74 +63,83 @@ pub(super) fn runs(robot: &Robot) -> Vec<Run> {
     let mut first = 0;
     let mut runs = Vec::with_capacity(ends.len());
     for last in ends {
-        runs.push(Run { first, last, pairs: stands(robot, first, last) });
+        runs.push(Run { first, last, pairs: relative_azimuths(robot, first, last) });
         first = last;
     }
     runs
 }
 
-fn stands(robot: &Robot, first: usize, last: usize) -> Vec<Stand> {
+fn relative_azimuths(robot: &Robot, first: usize, last: usize) -> Vec<RelativeAzimuth> {
     let paths = robot.paths();
-    let mut stands = Vec::with_capacity(paths.len() * paths.len());
+    let mut relative_azimuths = Vec::with_capacity(paths.len() * paths.len());
     for a in paths {
         for b in paths {
-            let mut stand = Stand::Apart;
+            let mut azimuths = RelativeAzimuth::Apart;
             if a.end() >= last && b.end() >= last {
                 for disk in first..=last {
                     let (sin, cos) = (b.azimuths[disk] - a.azimuths[disk]).sin_cos();
                     if sin.abs() < ON_ONE_LINE {
-                        stand = if cos > 0.0 { Stand::Same } else { Stand::Opposite };
+                        azimuths = if cos > 0.0 {
+                            RelativeAzimuth::Same
+                        } else {
+                            RelativeAzimuth::Opposite
+                        };
                         break;
                     }
                 }
             }
-            stands.push(stand);
+            relative_azimuths.push(azimuths);
         }
     }
-    stands
+    relative_azimuths
 }
 
 /// By how much a bend breaks a tendon's bound; negative where it leaves slack.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Overstretch {
-    /// As a share of the tendon's length in the run.
+    /// Overstretch as a share of the tendon's length in the run.
     pub(super) share: f64,
-    /// As the bend across the plane of the pulled tendon that would take it up.
+    /// Bend across the plane of the pulled tendon that would take it up.
     sideways: f64,
 }
 
-/// What the choice looks at.
-pub(super) struct Choice<'a> {
+/// Choice of the driving tendons at given displacements.
+pub(super) struct TendonChoice<'a> {
     pub(super) robot: &'a Robot,
     /// Pieces of every tendon, scaled to unit subsegments.
     pub(super) pieces: &'a [Vec<Hole>],
     pub(super) displacements: &'a [f64],
 }
 
-impl Choice<'_> {
+impl TendonChoice<'_> {
     /// The two most-pulled tendons of a run that are not on one line through the centre; with one
     /// pulled tendon, the one whose bound its bend would break, if there is one.
     ///
     /// # Errors
     /// `InvalidInput` when the pulled tendons share one azimuth: a linkage needs two directions.
-    pub(super) fn of(&self, run: &Run) -> Result<Drive, InvalidInput> {
+    pub(super) fn of(&self, run: &Run) -> Result<DrivingTendons, InvalidInput> {
         let tendons = self.displacements.len();
-        let Some(first) = self.most_pulled(run, |_| true) else { return Ok(Drive::None) };
-        let stand = |k: usize| run.pairs[first * tendons + k];
-        if let Some(second) = self.most_pulled(run, |k| k != first && stand(k) == Stand::Apart) {
-            return Ok(Drive::Two(first, second));
+        let Some(first) = self.most_pulled(run, |_| true) else { return Ok(DrivingTendons::None) };
+        let azimuths = |k: usize| run.pairs[first * tendons + k];
+        if let Some(second) =
+            self.most_pulled(run, |k| k != first && azimuths(k) == RelativeAzimuth::Apart)
+        {
+            return Ok(DrivingTendons::Two(first, second));
         }
-        if let Some(twin) = self.most_pulled(run, |k| k != first && stand(k) == Stand::Same) {
+        if let Some(twin) =
+            self.most_pulled(run, |k| k != first && azimuths(k) == RelativeAzimuth::Same)
+        {
             return Err(self.same_azimuth(run, first, twin));
         }
         // The pulled tendon leaves the bend across its own plane open; of those that would be
         // stretched, the one that asks for most of it decides.
-        let taut = (0..tendons)
-            .filter(|&k| k != first && stand(k) == Stand::Apart)
+        let stretched = (0..tendons)
+            .filter(|&k| k != first && azimuths(k) == RelativeAzimuth::Apart)
             .map(|k| (k, self.overstretch(run, first, k)))
             .filter(|(_, asked)| asked.share > BOUND_TOLERANCE)
             .max_by(|a, b| a.1.sideways.total_cmp(&b.1.sideways));
-        Ok(taut.map_or(Drive::One(first), |(second, _)| Drive::Two(first, second)))
+        Ok(stretched
+            .map_or(DrivingTendons::One(first), |(second, _)| DrivingTendons::Two(first, second)))
     }
 
     /// The tendon with the largest shortening in proportion to its length.
@@ -143,7 +152,7 @@ impl Choice<'_> {
             .reduce(|best, k| if pull(k) > pull(best) { k } else { best })
     }
 
-    /// What the bend of tendon `pulled` alone asks of tendon `k` beyond its bound, to first order. Free
+    /// Overstretch of tendon `k` beyond its bound by the bend of tendon `pulled` alone, to first order. Free
     /// tendons have no bound.
     pub(super) fn overstretch(&self, run: &Run, pulled: usize, k: usize) -> Overstretch {
         let path = &self.robot.paths()[k];

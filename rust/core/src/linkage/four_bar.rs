@@ -2,7 +2,7 @@
 //!
 //! Ashwin & Ghosal (eq. 7) minimise the coupler angle over `x0, xa` (four coordinates) under three
 //! fixed lengths. The crank `|x0 - X0|` and the coupler `|x0 - xa|` leave two angles, the link's and
-//! the disk's; the tendon piece `|xa - Xa|` is the one equality left.
+//! the disk's; the tendon piece `|xa - Xa|` is the remaining equality.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -11,6 +11,17 @@ use crate::solve::sqp::{Linearization, Problem};
 
 /// Minimum of the squared coupler angle of a planar subsegment. Lengths in units of the rest length
 /// of the subsegment; the tendon lies at `+x`.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::linkage::four_bar::FourBar;
+/// use tdcr::linkage::seven_bar::Hole;
+///
+/// let hole = Vector3::new(0.5, 0.0, 0.0);
+/// let problem = FourBar::new(&Hole::new(hole, hole, 0.1));
+/// // The exact answer is 2 asin(0.1); the start is its third order.
+/// assert!((problem.start().disk - 2.0 * 0.1_f64.asin()).abs() < 1e-5);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct FourBar {
     lower: f64,
@@ -24,6 +35,17 @@ pub struct FourBar {
 }
 
 /// Angles of a planar subsegment, positive towards the tendon.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::linkage::seven_bar::Hole;
+/// use tdcr::linkage::{LinkageSettings, solve_four_bar};
+///
+/// let hole = Vector3::new(0.5, 0.0, 0.0);
+/// let found = solve_four_bar(&Hole::new(hole, hole, 0.1), &LinkageSettings::default().sqp());
+/// assert!((found.point.disk - 2.0 * 0.1_f64.asin()).abs() < 1e-12);
+/// assert!((found.point.link - 0.5 * found.point.disk).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bend {
     /// Turn of the upper disk against the lower one \[rad\].
@@ -51,7 +73,7 @@ impl FourBar {
         }
     }
 
-    /// Whether the pull is so small that the start is the answer; see
+    /// True when the pull is so small that the start is the answer; see
     /// [`SevenBar::is_tiny`](super::seven_bar::SevenBar::is_tiny).
     #[must_use]
     pub fn is_tiny(&self) -> bool {

@@ -1,24 +1,24 @@
-//! What stood in the way of a solve, in words.
+//! Messages about a solve of the linkage model.
 
-use super::driving_tendons::{BOUND_TOLERANCE, Drive, Run};
+use super::driving_tendons::{BOUND_TOLERANCE, DrivingTendons, Run};
 use super::model::{Failure, Linkage, Scratch};
 use super::seven_bar::linear_bend;
-use super::subsegment::{BEND_MARGIN, Obstacle};
+use super::subsegment::{BEND_MARGIN, Infeasibility};
 use crate::solve::sqp::Ending;
 
 impl Linkage<'_> {
-    /// What stood in the way of the last solve in `work`; empty when it converged.
+    /// Reason why the last solve in `work` did not converge; empty when it did.
     pub(super) fn describe(&self, displacements: &[f64], work: &Scratch) -> String {
         match work.failure {
-            None => self.pushing(displacements, work),
-            Some(Failure::Reach { disk, run, obstacle: Obstacle::Bend }) => {
-                self.too_few(disk, run, work.drives[run], displacements)
+            None => self.push_message(displacements, work),
+            Some(Failure::Reach { disk, run, infeasibility: Infeasibility::Bend }) => {
+                self.subsegments_needed(disk, run, work.driving[run], displacements)
             }
-            Some(Failure::Reach { disk, run, obstacle: Obstacle::Piece(hole) }) => {
-                let tendon = match (work.drives[run], hole) {
-                    (Drive::Two(_, second), 1) => second,
-                    (Drive::One(first) | Drive::Two(first, _), _) => first,
-                    (Drive::None, _) => return String::new(),
+            Some(Failure::Reach { disk, run, infeasibility: Infeasibility::Piece(hole) }) => {
+                let tendon = match (work.driving[run], hole) {
+                    (DrivingTendons::Two(_, second), 1) => second,
+                    (DrivingTendons::One(first) | DrivingTendons::Two(first, _), _) => first,
+                    (DrivingTendons::None, _) => return String::new(),
                 };
                 format!(
                     "tendon '{}' is pulled by {} m, its path of {} m or more: no length is left \
@@ -43,7 +43,13 @@ impl Linkage<'_> {
 
     /// The smallest number of subsegments that takes the pull: more than `|(C, S)| / 2`, from the
     /// shortenings of the whole run.
-    fn too_few(&self, disk: usize, run: usize, drive: Drive, displacements: &[f64]) -> String {
+    fn subsegments_needed(
+        &self,
+        disk: usize,
+        run: usize,
+        tendons: DrivingTendons,
+        displacements: &[f64],
+    ) -> String {
         let Run { first, last, .. } = self.plan.runs[run];
         let arcs = self.robot.backbone().arc_lengths();
         let shortening = |k: usize| {
@@ -56,10 +62,10 @@ impl Linkage<'_> {
             };
             (path.holes[last], -displacements[k] * share)
         };
-        let (c, s) = match drive {
-            Drive::None => return String::new(),
-            Drive::One(k) => linear_bend(&[shortening(k)]),
-            Drive::Two(a, b) => linear_bend(&[shortening(a), shortening(b)]),
+        let (c, s) = match tendons {
+            DrivingTendons::None => return String::new(),
+            DrivingTendons::One(k) => linear_bend(&[shortening(k)]),
+            DrivingTendons::Two(a, b) => linear_bend(&[shortening(a), shortening(b)]),
         };
         let needed = 0.5 * c.hypot(s);
         let here = last - first;
@@ -72,13 +78,13 @@ impl Linkage<'_> {
         )
     }
 
-    /// What a converged answer should still say: the linkage keeps both lengths, as in the paper, also
+    /// Remark on a converged answer: the linkage keeps both lengths, as in the paper, also
     /// where the second tendon would have to push.
-    fn pushing(&self, displacements: &[f64], work: &Scratch) -> String {
+    fn push_message(&self, displacements: &[f64], work: &Scratch) -> String {
         let choice = self.choice(displacements);
         let names = self.robot.tendon_names();
-        for (run, drive) in self.plan.runs.iter().zip(&work.drives) {
-            let Drive::Two(a, b) = *drive else { continue };
+        for (run, tendons) in self.plan.runs.iter().zip(&work.driving) {
+            let DrivingTendons::Two(a, b) = *tendons else { continue };
             for (alone, pushed) in [(a, b), (b, a)] {
                 let share = choice.overstretch(run, alone, pushed).share;
                 if displacements[alone] < 0.0 && share < -BOUND_TOLERANCE {
@@ -101,7 +107,7 @@ impl Linkage<'_> {
             quoted.join(", ")
         };
         let mut parts: Vec<String> = Vec::new();
-        for k in self.overlong(displacements, &work.drives, state) {
+        for k in self.overlong(displacements, &work.driving, state) {
             let needs = state.tendon_lengths[k] - self.robot.paths()[k].rest_length;
             let given = displacements[k];
             parts.push(format!("'{}' would need {needs:+.6} m and has {given:+.6} m", names[k]));

@@ -21,11 +21,19 @@ pub use subsegment::{solve_four_bar, solve_seven_bar};
 use crate::error::InvalidInput;
 use crate::solve::sqp;
 
-/// How precisely and how long a subsegment is solved.
+/// Settings of the linkage model: tolerance and budget of a subsegment.
+///
+/// ```
+/// use tdcr::linkage::LinkageSettings;
+///
+/// let settings = LinkageSettings { max_iterations: 20, ..LinkageSettings::default() };
+/// assert!(settings.validate().is_ok());
+/// assert!(LinkageSettings { max_iterations: 0, ..settings }.validate().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkageSettings {
     /// The solve of a subsegment ends with the first full Newton step below this \[rad\]; the error
-    /// left is about its square.
+    /// that remains is about its square.
     pub step_tolerance: f64,
     /// Newton steps per subsegment at most.
     pub max_iterations: usize,

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::LinkageSettings;
-use super::driving_tendons::{BOUND_TOLERANCE, Choice, Drive, Run, runs};
+use super::driving_tendons::{BOUND_TOLERANCE, DrivingTendons, Run, TendonChoice, runs};
 use super::seven_bar::Hole;
-use super::subsegment::{Answer, Obstacle, Question};
+use super::subsegment::{Infeasibility, SubsegmentPose, SubsegmentProblem};
 use crate::error::InvalidInput;
 use crate::lie::Pose;
 use crate::model::{Model, Report, State};
@@ -13,7 +13,23 @@ use crate::robot::{Path, Robot};
 use crate::solve::sqp::{Ending, Settings};
 use crate::status::Status;
 
-/// What the linkage model knows of a robot before any displacement: worth keeping between solves.
+/// Linkage data of a robot, independent of the displacements: worth keeping between solves.
+///
+/// ```
+/// use tdcr::linkage::{Linkage, LinkageSettings, Plan};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// // One plan serves any settings and any number of solves.
+/// let plan = Plan::new(&robot)?;
+/// let linkage = Linkage::new(&robot, &plan, LinkageSettings::default())?;
+/// # let _ = linkage;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(super) runs: Vec<Run>,
@@ -42,6 +58,23 @@ impl Plan {
 }
 
 /// The linkage model of a robot, ready to solve.
+///
+/// ```
+/// use tdcr::linkage::{Linkage, LinkageSettings, Plan};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot)?;
+/// let linkage = Linkage::new(&robot, &plan, LinkageSettings::default())?;
+/// let shape = linkage.shape(&[-0.01, f64::INFINITY, f64::INFINITY])?;
+/// assert_eq!(shape.report.status, tdcr::Status::Converged);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Linkage<'r> {
     pub(super) robot: &'r Robot,
@@ -50,18 +83,39 @@ pub struct Linkage<'r> {
 }
 
 /// Buffers of a solve, reused from one to the next.
+///
+/// ```
+/// use tdcr::linkage::{Linkage, LinkageSettings, Plan, Scratch};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot)?;
+/// let linkage = Linkage::new(&robot, &plan, LinkageSettings::default())?;
+/// // The same buffers for many solves.
+/// let mut scratch = Scratch::default();
+/// for pull in [0.001, 0.002, 0.003] {
+///     linkage.solve(&[-pull, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+///     assert!((linkage.state(&scratch).tendon_lengths[0] - 0.2 + pull).abs() < 1e-9);
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     pub(super) state: State,
-    pub(super) drives: Vec<Drive>,
+    pub(super) driving: Vec<DrivingTendons>,
     pub(super) failure: Option<Failure>,
 }
 
-/// What failed first.
+/// First failure of a solve.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Failure {
     /// Upper disk of the subsegment, its run and what is in the way.
-    Reach { disk: usize, run: usize, obstacle: Obstacle },
+    Reach { disk: usize, run: usize, infeasibility: Infeasibility },
     /// Upper disk of a subsegment whose solve did not converge.
     Solve { disk: usize, ending: Ending },
     /// Tendons outside the linkage are longer than they may be.
@@ -83,36 +137,36 @@ impl<'r> Linkage<'r> {
     }
 
     /// The choice of tendons for these displacements.
-    pub(super) fn choice<'a>(&'a self, displacements: &'a [f64]) -> Choice<'a> {
-        Choice { robot: self.robot, pieces: &self.plan.pieces, displacements }
+    pub(super) fn choice<'a>(&'a self, displacements: &'a [f64]) -> TendonChoice<'a> {
+        TendonChoice { robot: self.robot, pieces: &self.plan.pieces, displacements }
     }
 
-    fn chain(&self, displacements: &[f64], work: &mut Scratch, report: &mut Report) {
-        let Scratch { state, drives, failure } = work;
+    fn solve_chain(&self, displacements: &[f64], work: &mut Scratch, report: &mut Report) {
+        let Scratch { state, driving, failure } = work;
         *failure = None;
         let lengths = self.robot.backbone().lengths();
         let settings = self.settings.sqp();
         let mut frame = *self.robot.base();
-        let mut last: Option<(Question, Answer)> = None;
+        let mut last: Option<(SubsegmentProblem, SubsegmentPose)> = None;
         state.clear();
         state.frames.reserve(lengths.len() + 1);
         state.strains.reserve(lengths.len());
         state.frames.push(frame);
         for (index, run) in self.plan.runs.iter().enumerate() {
             for i in run.first..run.last {
-                let question = self.question(drives[index], i, displacements);
+                let problem = self.problem(driving[index], i, displacements);
                 // Alike subsegments under alike pulls are one problem: it is solved once.
                 let answer = match last {
-                    Some((same, answer)) if same == question => answer,
+                    Some((same, answer)) if same == problem => answer,
                     _ => {
-                        let (answer, failed) = answer(&question, &settings, (i + 1, index));
+                        let (answer, failed) = answer(&problem, &settings, (i + 1, index));
                         report.residual = report.residual.max(answer.residual);
                         report.iterations += answer.iterations;
                         if let (Some((status, first)), None) = (failed, &failure) {
                             report.status = status;
                             *failure = Some(first);
                         }
-                        last = Some((question, answer));
+                        last = Some((problem, answer));
                         answer
                     }
                 };
@@ -126,25 +180,30 @@ impl<'r> Linkage<'r> {
         }
     }
 
-    fn question(&self, drive: Drive, subsegment: usize, displacements: &[f64]) -> Question {
+    fn problem(
+        &self,
+        tendons: DrivingTendons,
+        subsegment: usize,
+        displacements: &[f64],
+    ) -> SubsegmentProblem {
         let hole = |k: usize| {
             let piece = self.plan.pieces[k][subsegment];
             let share = -displacements[k] / self.robot.paths()[k].rest_length;
             Hole { pull: share * piece.rest, ..piece }
         };
-        match drive {
-            Drive::None => Question::Straight,
-            Drive::One(k) => {
+        match tendons {
+            DrivingTendons::None => SubsegmentProblem::Straight,
+            DrivingTendons::One(k) => {
                 let hole = hole(k);
                 let azimuths = &self.robot.paths()[k].azimuths;
                 if hole.is_alike() || azimuths[subsegment] == azimuths[subsegment + 1] {
-                    return Question::Planar(hole);
+                    return SubsegmentProblem::Planar(hole);
                 }
                 let quarter = |h: Vector3<f64>| Vector3::new(-h.y, h.x, 0.0);
                 let span = Hole::new(quarter(hole.lower), quarter(hole.upper), 0.0);
-                Question::Spatial([hole, span])
+                SubsegmentProblem::Spatial([hole, span])
             }
-            Drive::Two(a, b) => Question::Pair([hole(a), hole(b)]),
+            DrivingTendons::Two(a, b) => SubsegmentProblem::Pair([hole(a), hole(b)]),
         }
     }
 
@@ -152,21 +211,21 @@ impl<'r> Linkage<'r> {
     pub(super) fn overlong<'a>(
         &'a self,
         displacements: &'a [f64],
-        drives: &'a [Drive],
+        driving: &'a [DrivingTendons],
         state: &'a State,
     ) -> impl Iterator<Item = usize> + 'a {
         // Those that drive on their whole way meet their length as a constraint, to the solver's
         // tolerance.
-        let drives = move |k: usize, end: usize| {
-            let mut way = self.plan.runs.iter().zip(drives).take_while(|(run, _)| run.last <= end);
-            way.all(|(_, drive)| drive.contains(k))
+        let driving = move |k: usize, end: usize| {
+            let mut way = self.plan.runs.iter().zip(driving).take_while(|(run, _)| run.last <= end);
+            way.all(|(_, tendons)| tendons.contains(k))
         };
         let bound = move |k: usize, path: &Path| {
             path.rest_length * (1.0 + BOUND_TOLERANCE) + displacements[k]
         };
         (self.robot.paths().iter().enumerate())
             .filter(move |(k, path)| {
-                !drives(*k, path.end()) && state.tendon_lengths[*k] > bound(*k, path)
+                !driving(*k, path.end()) && state.tendon_lengths[*k] > bound(*k, path)
             })
             .map(|(k, _)| k)
     }
@@ -181,12 +240,12 @@ impl Model for Linkage<'_> {
 
     fn solve(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
         let choice = self.choice(displacements);
-        work.drives.clear();
+        work.driving.clear();
         for run in &self.plan.runs {
-            work.drives.push(choice.of(run)?);
+            work.driving.push(choice.of(run)?);
         }
         let mut report = Report { status: Status::Converged, residual: 0.0, iterations: 0 };
-        self.chain(displacements, work, &mut report);
+        self.solve_chain(displacements, work, &mut report);
         let state = &mut work.state;
         let backbone = self.robot.backbone();
         state.tendon_lengths.extend(self.robot.paths().iter().map(|p| p.length(&state.frames)));
@@ -199,7 +258,7 @@ impl Model for Linkage<'_> {
             work.failure = Some(Failure::Solve { disk, ending: Ending::NumericalError });
         }
         if work.failure.is_none()
-            && self.overlong(displacements, &work.drives, &work.state).next().is_some()
+            && self.overlong(displacements, &work.driving, &work.state).next().is_some()
         {
             report.status = Status::Infeasible;
             work.failure = Some(Failure::Bound);
@@ -222,15 +281,15 @@ impl Model for Linkage<'_> {
 
 /// Solves one subsegment, given by its upper disk and its run.
 fn answer(
-    question: &Question,
+    problem: &SubsegmentProblem,
     settings: &Settings,
     (disk, run): (usize, usize),
-) -> (Answer, Option<(Status, Failure)>) {
-    if let Some(obstacle) = question.obstacle() {
-        let failure = Failure::Reach { disk, run, obstacle };
-        return (question.stand_in(), Some((Status::Infeasible, failure)));
+) -> (SubsegmentPose, Option<(Status, Failure)>) {
+    if let Some(infeasibility) = problem.infeasibility() {
+        let failure = Failure::Reach { disk, run, infeasibility };
+        return (problem.fallback_pose(), Some((Status::Infeasible, failure)));
     }
-    let answer = question.solve(settings);
+    let answer = problem.solve(settings);
     let status = match answer.ending {
         Ending::Converged => return (answer, None),
         Ending::Infeasible => Status::Infeasible,

@@ -3,6 +3,15 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// A pose of the upper disk: link direction and disk rotation, with what both derivatives need.
+///
+/// ```
+/// use tdcr::linkage::Pose;
+///
+/// let pose = Pose::from_bend(0.4, 0.0);
+/// // The link points at half the bend.
+/// assert!((pose.link.x.atan2(pose.link.z) - 0.2).abs() < 1e-15);
+/// assert!((pose.rotation_vector().y - 0.4).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
     /// Unit vector from the lower to the upper disk centre, in the lower disk's frame.
@@ -33,14 +42,14 @@ impl Pose {
 
     /// Bent by `angle` \[rad\] towards `azimuth` \[rad\] with the link at half the bend.
     #[must_use]
-    pub fn bent(angle: f64, azimuth: f64) -> Self {
+    pub fn from_bend(angle: f64, azimuth: f64) -> Self {
         let (sin, cos) = azimuth.sin_cos();
-        Self::bent_towards(angle, cos, sin)
+        Self::from_bend_towards(angle, cos, sin)
     }
 
-    /// The same, towards the unit vector `(cos, sin)`.
+    /// Pose bent towards the unit vector `(cos, sin)`.
     #[must_use]
-    pub(super) fn bent_towards(angle: f64, cos: f64, sin: f64) -> Self {
+    pub(super) fn from_bend_towards(angle: f64, cos: f64, sin: f64) -> Self {
         let (half_sin, half_cos) = (0.5 * angle).sin_cos();
         Self::from_parts(
             Vector3::new(half_sin * cos, half_sin * sin, half_cos),

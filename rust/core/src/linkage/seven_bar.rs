@@ -15,6 +15,14 @@ use crate::solve::sqp::{Linearization, Problem};
 
 /// A tendon hole on the lower and the upper disk of a subsegment, and the pull on its piece.
 /// Lengths in units of the rest length of the subsegment.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::linkage::seven_bar::Hole;
+///
+/// let hole = Hole::new(Vector3::x() * 0.5, Vector3::x() * 0.4, 0.1);
+/// assert!(!hole.is_alike() && hole.rest > 1.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hole {
     /// Place in the lower disk's frame.
@@ -39,14 +47,14 @@ impl Hole {
         Self { lower, upper, pull, rest }
     }
 
-    /// Whether it has the same place on both disks.
+    /// True when it has the same position on both disks.
     #[must_use]
     pub fn is_alike(&self) -> bool {
         self.lower == self.upper
     }
 }
 
-/// Constants of one hole, worked out once per subsegment.
+/// Constants of one hole, computed once per subsegment.
 #[derive(Clone, Copy, Debug)]
 struct Coupler {
     lower: Vector3<f64>,
@@ -78,6 +86,16 @@ impl Coupler {
 pub(super) const TINY_BEND: f64 = 1e-100;
 
 /// Minimum of the squared coupler angles of two holes, of which the first `M` carry a tendon.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::linkage::seven_bar::{Hole, SevenBar};
+///
+/// let (a, b) = (Vector3::x() * 0.5, Vector3::y() * 0.5);
+/// let problem = SevenBar::<2>::new(&[Hole::new(a, a, 0.1), Hole::new(b, b, 0.1)]);
+/// assert!(!problem.is_tiny());
+/// assert!(problem.start().link.z > 0.9);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct SevenBar<const M: usize> {
     couplers: [Coupler; 2],
@@ -105,7 +123,7 @@ impl<const M: usize> SevenBar<M> {
         Self { couplers, bisection: if alike { 0.0 } else { 1.0 }, crank_unit }
     }
 
-    /// Whether the pull is so small that its square underflows: the start, which is off by a share of
+    /// True when the pull is so small that its square underflows: the start, which is off by a share of
     /// bend^2 / 24, then is the answer to the last digit.
     #[must_use]
     pub fn is_tiny(&self) -> bool {
@@ -121,9 +139,9 @@ impl<const M: usize> SevenBar<M> {
         let bend = (c * c + s * s).sqrt();
         // Too small for squares: the direction from the larger component.
         if bend < 1e-140 {
-            return Pose::bent(c.hypot(s), s.atan2(c));
+            return Pose::from_bend(c.hypot(s), s.atan2(c));
         }
-        Pose::bent_towards(third_order(bend), c / bend, s / bend)
+        Pose::from_bend_towards(third_order(bend), c / bend, s / bend)
     }
 }
 
@@ -154,6 +172,18 @@ pub(super) fn linear_bend(rows: &[(Vector3<f64>, f64)]) -> (f64, f64) {
 }
 
 /// A pose with what the value, the gradient and the second derivatives share.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::linkage::seven_bar::Hole;
+/// use tdcr::linkage::{LinkageSettings, solve_seven_bar};
+///
+/// let (a, b) = (Vector3::x() * 0.5, Vector3::y() * 0.5);
+/// let holes = [Hole::new(a, a, 0.1), Hole::new(b, b, 0.1)];
+/// let found = solve_seven_bar::<2>(&holes, &LinkageSettings::default().sqp(), None);
+/// let piece = found.point.pose.link + found.point.pose.rotation() * a - a;
+/// assert!((piece.norm() - 0.9).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
     /// The pose itself.

@@ -7,9 +7,9 @@ use super::pose::Pose;
 use super::seven_bar::{Hole, Point, SevenBar, linear_bend};
 use crate::solve::sqp::{self, Ending, Problem, Settings, Solution};
 
-/// What is asked of a subsegment; equal questions have equal answers.
+/// Linkage of one subsegment and its pulls; equal problems have equal poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Question {
+pub(super) enum SubsegmentProblem {
     /// No tendon pulls: straight, by definition.
     Straight,
     /// One tendon whose azimuth is the same on both disks.
@@ -22,7 +22,7 @@ pub(super) enum Question {
 
 /// Pose of the upper disk in the frame of the lower one, for a unit subsegment.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Answer {
+pub(super) struct SubsegmentPose {
     pub(super) rotation: Matrix3<f64>,
     pub(super) rotation_vector: Vector3<f64>,
     pub(super) link: Vector3<f64>,
@@ -36,16 +36,16 @@ pub(super) const BEND_MARGIN: f64 = 1e-12;
 
 /// Why a subsegment cannot follow its tendons, known before it is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Obstacle {
+pub(super) enum Infeasibility {
     /// Half the norm of `(c, s)`, which is the sine of half the bend, reaches 1.
     Bend,
-    /// A hole (0 or 1) whose tendon piece would have no length left.
+    /// A hole (0 or 1) whose tendon piece would have no length.
     Piece(usize),
 }
 
-impl Question {
+impl SubsegmentProblem {
     /// The holes that carry a tendon.
-    fn pulled(&self) -> &[Hole] {
+    fn driven_holes(&self) -> &[Hole] {
         match self {
             Self::Straight => &[],
             Self::Planar(hole) => std::slice::from_ref(hole),
@@ -56,9 +56,9 @@ impl Question {
 
     /// The bound of the exact answer, where there is one (Ashwin & Ghosal, eq. 8, for one tendon;
     /// `docs/linkage.md` for two), and the length of the pieces.
-    pub(super) fn obstacle(&self) -> Option<Obstacle> {
-        if let Some(hole) = self.pulled().iter().position(|hole| hole.pull >= hole.rest) {
-            return Some(Obstacle::Piece(hole));
+    pub(super) fn infeasibility(&self) -> Option<Infeasibility> {
+        if let Some(hole) = self.driven_holes().iter().position(|hole| hole.pull >= hole.rest) {
+            return Some(Infeasibility::Piece(hole));
         }
         let bound = match self {
             Self::Planar(hole) if hole.is_alike() => Some(0.5 * hole.pull / hole.upper.norm()),
@@ -70,44 +70,44 @@ impl Question {
         };
         // Written so that a NaN counts as out of reach.
         let within = |half: f64| half < 1.0 - BEND_MARGIN;
-        bound.is_some_and(|half| !within(half)).then_some(Obstacle::Bend)
+        bound.is_some_and(|half| !within(half)).then_some(Infeasibility::Bend)
     }
 
     /// Solves the linkage.
-    pub(super) fn solve(&self, settings: &Settings) -> Answer {
+    pub(super) fn solve(&self, settings: &Settings) -> SubsegmentPose {
         match self {
-            Self::Straight => Answer::new(&Pose::straight(), Ending::Converged, 0.0, 0),
+            Self::Straight => SubsegmentPose::new(&Pose::straight(), Ending::Converged, 0.0, 0),
             Self::Planar(hole) => {
                 let found = solve_four_bar(hole, settings);
                 let azimuth = hole.upper / hole.upper.norm();
                 let (sin, cos) = found.point.link.sin_cos();
                 let link = azimuth * sin + Vector3::z() * cos;
                 let turn = Vector3::new(-azimuth.y, azimuth.x, 0.0) * found.point.disk;
-                Answer::from_solution(&Pose::new(&link, &turn), &found)
+                SubsegmentPose::from_solution(&Pose::new(&link, &turn), &found)
             }
             Self::Spatial(holes) => {
                 let found = solve_seven_bar::<1>(holes, settings, None);
-                Answer::from_solution(&found.point.pose, &found)
+                SubsegmentPose::from_solution(&found.point.pose, &found)
             }
             Self::Pair(holes) => {
                 let found = solve_seven_bar::<2>(holes, settings, None);
-                Answer::from_solution(&found.point.pose, &found)
+                SubsegmentPose::from_solution(&found.point.pose, &found)
             }
         }
     }
 
-    /// The pose to go on with where there is no answer: bent as far as the start goes.
-    pub(super) fn stand_in(&self) -> Answer {
+    /// Pose with which the chain continues where there is no answer: that of the start.
+    pub(super) fn fallback_pose(&self) -> SubsegmentPose {
         let pose = match self {
             Self::Straight => Pose::straight(),
             Self::Planar(hole) => {
                 let bend = FourBar::new(hole).start();
-                Pose::bent(bend.disk, hole.upper.y.atan2(hole.upper.x))
+                Pose::from_bend(bend.disk, hole.upper.y.atan2(hole.upper.x))
             }
             Self::Spatial(holes) => SevenBar::<1>::new(holes).start(),
             Self::Pair(holes) => SevenBar::<2>::new(holes).start(),
         };
-        Answer::new(&pose, Ending::Infeasible, self.violation(&pose), 0)
+        SubsegmentPose::new(&pose, Ending::Infeasible, self.violation(&pose), 0)
     }
 
     /// Largest relative error of a tendon piece at a pose.
@@ -116,11 +116,11 @@ impl Question {
             let piece = (pose.link + pose.rotation() * hole.upper - hole.lower).norm();
             (piece - (hole.rest - hole.pull)).abs() / hole.rest
         };
-        self.pulled().iter().map(error).fold(0.0, f64::max)
+        self.driven_holes().iter().map(error).fold(0.0, f64::max)
     }
 }
 
-impl Answer {
+impl SubsegmentPose {
     fn new(pose: &Pose, ending: Ending, residual: f64, iterations: usize) -> Self {
         Self {
             rotation: pose.rotation(),
@@ -143,20 +143,20 @@ impl Answer {
 pub fn solve_four_bar(hole: &Hole, settings: &Settings) -> Solution<super::four_bar::Bend, 1> {
     let problem = FourBar::new(hole);
     if problem.is_tiny() {
-        return Solution::known(problem.start());
+        return Solution::without_iterations(problem.start());
     }
     let found = sqp::minimize(&problem, problem.start(), settings);
     if found.ending == Ending::Converged {
         return found;
     }
-    in_steps(found, settings, |share, from| {
+    continuation_in_pull(found, settings, |share, from| {
         let problem = FourBar::new(&Hole { pull: share * hole.pull, ..*hole });
         (problem, from.unwrap_or_else(|| problem.start()))
     })
 }
 
 /// The seven-bar linkage with tendons in its first `M` holes, from `start` or its own. A start that
-/// leads nowhere (the mirror branch, say) falls back to its own.
+/// does not converge (on the mirror branch, say) falls back to its own.
 #[must_use]
 pub fn solve_seven_bar<const M: usize>(
     holes: &[Hole; 2],
@@ -166,7 +166,7 @@ pub fn solve_seven_bar<const M: usize>(
     let problem = SevenBar::<M>::new(holes);
     let own = problem.point(problem.start());
     if problem.is_tiny() {
-        return Solution::known(own);
+        return Solution::without_iterations(own);
     }
     let mut found = sqp::minimize(&problem, start.map_or(own, |p| problem.point(p)), settings);
     if start.is_some() && found.ending != Ending::Converged {
@@ -177,18 +177,18 @@ pub fn solve_seven_bar<const M: usize>(
     if found.ending == Ending::Converged {
         return found;
     }
-    let mut found = in_steps(found, settings, |share, from| {
+    let mut found = continuation_in_pull(found, settings, |share, from| {
         let pulled = holes.map(|hole| Hole { pull: share * hole.pull, ..hole });
         let problem = SevenBar::<M>::new(&pulled);
         let pose = from.map_or_else(|| problem.start(), |point: Point| point.pose);
         (problem, problem.point(pose))
     });
-    // Out of reach from one start is not out of reach: others before it is said.
+    // Out of reach from one start is not out of reach: other starts follow.
     for (bend, towards) in OTHER_STARTS {
         if found.ending == Ending::Converged {
             break;
         }
-        let start = problem.point(Pose::bent(bend, towards * std::f64::consts::PI));
+        let start = problem.point(Pose::from_bend(bend, towards * std::f64::consts::PI));
         let other = sqp::minimize(&problem, start, settings);
         let iterations = found.iterations + other.iterations;
         let better = if other.ending == Ending::Converged { other } else { found };
@@ -216,8 +216,8 @@ const OTHER_STARTS: [(f64, f64); 12] = [
 /// Steps of the fallback along the pull.
 const STEPS: usize = 8;
 
-/// Where one solve from the start failed: along the pull in equal steps, each from the last answer.
-fn in_steps<const N: usize, const M: usize, P: Problem<N, M>>(
+/// Continuation along the pull in equal steps, each from the last answer, after one solve from the start failed.
+fn continuation_in_pull<const N: usize, const M: usize, P: Problem<N, M>>(
     found: Solution<P::Point, M>,
     settings: &Settings,
     at: impl Fn(f64, Option<P::Point>) -> (P, P::Point),

@@ -3,6 +3,12 @@
 use nalgebra::Vector3;
 
 /// Which point of a disk.
+///
+/// ```
+/// use tdcr::PointKind;
+///
+/// assert_eq!(PointKind::ALL.map(PointKind::as_str), ["center", "hole", "mirror"]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PointKind {
     /// The centre, or the body around it.
@@ -28,7 +34,25 @@ impl PointKind {
     }
 }
 
-/// A place where a robot touches an obstacle, in the world.
+/// Contact of a point of a robot with an obstacle, in the world.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::{Contact, PointKind};
+///
+/// let contact = Contact {
+///     disk: 11,
+///     kind: PointKind::Hole,
+///     tendon: Some(0),
+///     obstacle: 0,
+///     point: Vector3::new(0.01, 0.0, 0.1),
+///     normal: Vector3::x(),
+///     gap: 0.0,
+///     force: Vector3::x() * 0.4,
+/// };
+/// // Without friction a contact pushes along its normal.
+/// assert!(contact.force.cross(&contact.normal).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// The disk.
@@ -39,11 +63,11 @@ pub struct Contact {
     pub tendon: Option<usize>,
     /// Index of the obstacle.
     pub obstacle: usize,
-    /// Place of the robot's point \[m\].
+    /// Position of the robot's point \[m\].
     pub point: Vector3<f64>,
     /// Unit normal of the obstacle, towards the robot.
     pub normal: Vector3<f64>,
-    /// Distance left \[m\].
+    /// Gap \[m\].
     pub gap: f64,
     /// Force on the robot, in the unit of the results.
     pub force: Vector3<f64>,

@@ -12,6 +12,29 @@ pub use shape::Shape;
 pub use state::{Report, State};
 
 /// A robot prepared for one forward model.
+///
+/// ```
+/// use tdcr::constant_curvature::{ConstantCurvature, ConstantCurvatureSettings, Plan};
+/// use tdcr::model::Model;
+///
+/// // Works with any model.
+/// fn tip_height<M: Model>(model: &M, displacements: &[f64]) -> Result<f64, tdcr::InvalidInput> {
+///     let mut scratch = M::Scratch::default();
+///     model.solve(displacements, &mut scratch)?;
+///     Ok(model.state(&scratch).frames.last().map_or(0.0, |tip| tip.translation.z))
+/// }
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let height = tip_height(&ConstantCurvature::new(&robot, &plan), &[0.0; 3])?;
+/// assert!((height - 0.2).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 pub trait Model: Sync {
     /// Buffers of a solve.
     type Scratch: Default + Send;
@@ -40,7 +63,7 @@ pub trait Model: Sync {
         work: &mut Self::Scratch,
     ) -> Result<Report, InvalidInput>;
 
-    /// As [`Model::solve`], from what the last solve of this model left in `work`, where the model can
+    /// Solves from the last solve of this model in `work`, where the model can
     /// start from that.
     ///
     /// # Errors
@@ -59,7 +82,7 @@ pub trait Model: Sync {
     /// The buffers' quantities, taken out of them.
     fn take_state(&self, work: Self::Scratch) -> State;
 
-    /// What stood in the way of the last solve, in a sentence; empty when it converged.
+    /// Reason why the last solve did not converge, in a sentence; empty when it did.
     fn message(&self, displacements: &[f64], work: &Self::Scratch) -> String;
 
     /// Solves once and builds the whole result.

@@ -7,6 +7,25 @@ use crate::lie::Pose;
 use crate::status::Status;
 
 /// The solved quantities, in buffers that are reused from one solve to the next.
+///
+/// ```
+/// use tdcr::linkage::{Linkage, LinkageSettings, Plan};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot)?;
+/// let state = Linkage::new(&robot, &plan, LinkageSettings::default())?
+///     .shape(&[-0.005, f64::INFINITY, f64::INFINITY])?
+///     .state;
+/// assert_eq!((state.frames.len(), state.strains.len()), (11, 10));
+/// assert!((state.tendon_lengths[0] - 0.195).abs() < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct State {
     /// Frame of every disk in the world, disk 0 first.
@@ -19,7 +38,7 @@ pub struct State {
     pub tendon_lengths: Vec<f64>,
     /// Tension of every tendon; NaN in models that know no forces.
     pub tensions: Vec<f64>,
-    /// Where the robot touches obstacles.
+    /// Contacts of the robot with obstacles.
     pub contacts: Vec<Contact>,
     /// Strain energy of the backbone \[J, or 1/m in units of EI\].
     pub energy: f64,
@@ -49,7 +68,26 @@ impl State {
     }
 }
 
-/// How a solve ended, without any text.
+/// Outcome of a solve, without any text.
+///
+/// ```
+/// use tdcr::linkage::{Linkage, LinkageSettings, Plan};
+/// use tdcr::model::Model;
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot)?;
+/// let linkage = Linkage::new(&robot, &plan, LinkageSettings::default())?;
+/// let mut scratch = Default::default();
+/// let report = linkage.solve(&[-0.005, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+/// assert_eq!(report.status, tdcr::Status::Converged);
+/// assert!(report.residual < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// The outcome.

@@ -7,6 +7,16 @@ use crate::error::{self, InvalidInput, finite_vector, length};
 use crate::lie::Pose;
 
 /// A box with any axes.
+///
+/// ```
+/// use nalgebra::{Matrix3, Vector3};
+/// use tdcr::obstacle::{Cuboid, Obstacle};
+///
+/// let half = Vector3::new(0.02, 0.02, 0.05);
+/// let block = Cuboid::new(&Vector3::zeros(), &half, &Matrix3::identity()).unwrap();
+/// let near = Obstacle::new(block, false).nearest(&Vector3::new(0.05, 0.0, 0.0)).unwrap();
+/// assert!((near.distance - 0.03).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
     /// The frame of its centre, axes along its edges.

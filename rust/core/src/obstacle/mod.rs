@@ -1,4 +1,4 @@
-//! What a robot must stay out of, or inside of: volumes with signed distances.
+//! Obstacles: volumes with signed distances that a robot stays out of, or inside of.
 //!
 //! A point's signed distance is positive outside the volume; `inside` turns the volume into a lumen and
 //! the sign around. [`Obstacle::nearest`] gives it with its derivatives, [`Obstacle::constraints`] the
@@ -25,6 +25,16 @@ use crate::lie::Pose;
 const KINK: f64 = 1e-150;
 
 /// A condition near a point: its value, to be kept at or above zero, with derivatives by the point.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::{Obstacle, Sphere};
+///
+/// let ball = Obstacle::new(Sphere::new(&Vector3::zeros(), 0.02).unwrap(), false);
+/// let near = ball.nearest(&Vector3::new(0.0, 0.0, 0.05)).unwrap();
+/// assert!((near.distance - 0.03).abs() < 1e-15);
+/// assert_eq!(near.gradient, Vector3::z());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Near {
     /// Signed distance, positive where the robot may be \[m\].
@@ -57,7 +67,7 @@ impl Near {
         Self { distance: r - radius, gradient: normal, hessian, feature: 0 }
     }
 
-    /// The same seen from the other side.
+    /// Condition seen from the other side.
     fn flipped(self, flip: bool) -> Self {
         if !flip {
             return self;
@@ -78,6 +88,17 @@ impl Near {
 }
 
 /// The shapes an obstacle can have.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::{HalfSpace, Volume};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let floor = Volume::from(HalfSpace::new(&Vector3::zeros(), &Vector3::z())?);
+/// assert!(matches!(floor, Volume::HalfSpace(_)));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Volume {
     /// A ball.
@@ -109,6 +130,17 @@ macro_rules! volume_from {
 volume_from!(Sphere, Cylinder, HalfSpace, Capsule, Cuboid, Mesh, SignedDistance);
 
 /// A volume that the robot stays out of, or inside of. Cheap to clone.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::{Cylinder, Obstacle};
+///
+/// // A lumen of 30 mm: the robot stays inside.
+/// let tube = Cylinder::new(&Vector3::zeros(), &Vector3::z(), 0.015).unwrap();
+/// let lumen = Obstacle::new(tube, true);
+/// let near = lumen.nearest(&Vector3::new(0.010, 0.0, 0.1)).unwrap();
+/// assert!((near.distance - 0.005).abs() < 1e-15);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obstacle {
     volume: Volume,
@@ -128,13 +160,13 @@ impl Obstacle {
         &self.volume
     }
 
-    /// Whether the robot has to stay in it.
+    /// True when the robot has to stay in it.
     #[must_use]
     pub fn inside(&self) -> bool {
         self.inside
     }
 
-    /// The same obstacle moved: given in the frame `pose`, seen from outside that frame.
+    /// Obstacle moved with its frame: given in the frame `pose`, seen from outside that frame.
     #[must_use]
     pub fn transformed(&self, pose: &Pose) -> Self {
         let volume = match &self.volume {
@@ -223,7 +255,7 @@ hash_by_bits!(Obstacle, |obstacle, bits| {
     }
 });
 
-/// How far from a point places count.
+/// Distance from a point within which others count.
 fn within(distance: f64, reach: f64) -> f64 {
     reach - distance.min(0.0)
 }

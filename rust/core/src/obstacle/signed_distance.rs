@@ -9,10 +9,31 @@ use super::{Near, moved};
 use crate::error::InvalidInput;
 use crate::lie::Pose;
 
-/// What a distance function failed with.
+/// Error of a distance function.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::{Obstacle, SignedDistance, by_differences};
+///
+/// let broken = by_differences(|_: &Vector3<f64>| Err("no map of that place".into()));
+/// let obstacle = Obstacle::new(SignedDistance::new(broken), false);
+/// let fault = obstacle.nearest(&Vector3::zeros()).unwrap_err();
+/// assert_eq!(fault.to_string(), "no map of that place");
+/// ```
 pub type Fault = Box<dyn std::error::Error + Send + Sync>;
 
 /// A signed distance \[m\] and its gradient at a point.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use std::sync::Arc;
+/// use tdcr::obstacle::{DistanceFunction, SignedDistance};
+///
+/// // Above the plane z = 0.
+/// let function: DistanceFunction = Arc::new(|x: &Vector3<f64>| Ok((x.z, Vector3::z())));
+/// let floor = SignedDistance::new(function);
+/// # drop(floor);
+/// ```
 pub type DistanceFunction =
     Arc<dyn Fn(&Vector3<f64>) -> Result<(f64, Vector3<f64>), Fault> + Send + Sync>;
 
@@ -34,7 +55,7 @@ where
     })
 }
 
-/// What differences around a point are taken over a small share of \[m\].
+/// Length of which the step of a difference is a small share \[m\].
 fn scale(x: &Vector3<f64>, distance: f64) -> f64 {
     x.amax().max(distance.abs()).max(0.01)
 }
@@ -47,6 +68,19 @@ fn beside(x: &Vector3<f64>, axis: usize, h: f64) -> (Vector3<f64>, Vector3<f64>)
 }
 
 /// Whatever a function calls the inside: negative there, positive outside.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::{Obstacle, SignedDistance, by_differences};
+///
+/// // A torus about z, its gradient by differences.
+/// let torus = by_differences(|x: &Vector3<f64>| {
+///     Ok((x.x.hypot(x.y) - 0.05).hypot(x.z) - 0.01)
+/// });
+/// let ring = Obstacle::new(SignedDistance::new(torus), false);
+/// let near = ring.nearest(&Vector3::new(0.05, 0.0, 0.03)).unwrap();
+/// assert!((near.distance - 0.02).abs() < 1e-12);
+/// ```
 #[derive(Clone)]
 pub struct SignedDistance {
     function: DistanceFunction,

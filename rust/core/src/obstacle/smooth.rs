@@ -7,6 +7,17 @@ use crate::error::{InvalidInput, direction, finite_vector, length};
 use crate::lie::Pose;
 
 /// A ball.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::Sphere;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let ball = Sphere::new(&Vector3::new(0.0, 0.0, 0.1), 0.02)?;
+/// assert_eq!(ball.radius(), 0.02);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     center: Vector3<f64>,
@@ -46,6 +57,18 @@ impl Sphere {
 }
 
 /// An infinite round bar.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::Cylinder;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// // The axis may have any length.
+/// let bar = Cylinder::new(&Vector3::zeros(), &Vector3::new(0.0, 3.0, 0.0), 0.01)?;
+/// assert_eq!(bar.axis(), Vector3::y());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
     point: Vector3<f64>,
@@ -97,6 +120,17 @@ impl Cylinder {
 }
 
 /// All that lies behind a plane.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::HalfSpace;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let wall = HalfSpace::new(&Vector3::new(0.05, 0.0, 0.0), &Vector3::new(-2.0, 0.0, 0.0))?;
+/// assert_eq!(wall.normal(), -Vector3::x());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
     point: Vector3<f64>,
@@ -135,6 +169,15 @@ impl HalfSpace {
 }
 
 /// A bar with round ends: all points within the radius of a segment.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::{Capsule, Obstacle};
+///
+/// let capsule = Capsule::new(&Vector3::zeros(), &Vector3::new(0.0, 0.0, 0.1), 0.01).unwrap();
+/// let near = Obstacle::new(capsule, false).nearest(&Vector3::new(0.0, 0.0, 0.15)).unwrap();
+/// assert!((near.distance - 0.04).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
     a: Vector3<f64>,

@@ -6,6 +6,16 @@ use crate::error::{InvalidInput, finite};
 
 /// A natural cubic spline through nodal angles: twice continuously differentiable, second derivative
 /// zero at both ends.
+///
+/// ```
+/// use tdcr::planar::AngleFunction;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let function = AngleFunction::new(vec![0.0, 0.1, 0.2], &[0.0, 0.5, 0.0])?;
+/// assert_eq!(function.at(0.1), 0.5);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct AngleFunction {
     nodes: Vec<f64>,
@@ -14,6 +24,18 @@ pub struct AngleFunction {
 }
 
 /// A curve of unit speed at the ends of Simpson's double intervals.
+///
+/// ```
+/// use tdcr::planar::AngleFunction;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// // A straight line at 0.3 rad.
+/// let curve = AngleFunction::new(vec![0.0, 0.2], &[0.3, 0.3])?.curve(10)?;
+/// let tip = curve.points[curve.points.len() - 1];
+/// assert!((tip.y - 0.2 * 0.3_f64.sin()).abs() < 1e-15 && curve.error < 1e-15);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     /// Arc lengths \[m\].
@@ -33,6 +55,7 @@ impl AngleFunction {
     /// `InvalidInput` for fewer than two nodes, arc lengths that do not rise, other numbers of angles
     /// than nodes, values that are not finite, or a spline that overflows.
     pub fn new(s: Vec<f64>, angles: &[f64]) -> Result<Self, InvalidInput> {
+        // Nodes: at least two, finite, rising.
         if s.len() < 2 {
             return Err(InvalidInput::new("s", "at least 2 nodes", s.len()));
         }
@@ -54,6 +77,7 @@ impl AngleFunction {
             let got = format!("{:?} to {:?}", s[0], s[s.len() - 1]);
             return Err(InvalidInput::new("s", "a span that does not overflow [m]", got));
         }
+        // Coefficients a, b, c, d of every piece (eq. 10).
         let curvature = second_derivatives(&s, angles);
         let piece = |i: usize| {
             let h = s[i + 1] - s[i];
@@ -111,6 +135,7 @@ impl AngleFunction {
             let expected = format!("2 to {MOST} intervals");
             return Err(InvalidInput::new("intervals", expected, intervals));
         }
+        // The curve starts at the origin with the first heading.
         let whole = self.nodes[self.nodes.len() - 1] - self.nodes[0];
         let start = self.nodes[0];
         let mut curve = Curve {
@@ -127,6 +152,7 @@ impl AngleFunction {
             // Rounding must not add a pair where the share is whole.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // Within MOST.
             let pairs = (share - 1e-9 * share).ceil().max(1.0) as usize;
+            // Simpson's rule (eq. 11), two intervals of length h at a time.
             let h = 0.5 * length / pairs as f64;
             let mut before = direction(self.in_piece(i, 0.0));
             for k in 0..pairs {
@@ -140,6 +166,7 @@ impl AngleFunction {
                 curve.points.push(at);
                 curve.headings.push(heading);
             }
+            // Error bound of the piece, h^4 l/180 max |(exp(i alpha))''''|.
             let share = 0.5 / pairs as f64;
             curve.error += share.powi(4) / 180.0 * (length * self.fourth(i));
         }

@@ -1,4 +1,4 @@
-//! Many targets, on all cores.
+//! Batches of targets, on all cores.
 
 use std::sync::atomic::Ordering;
 
@@ -12,8 +12,23 @@ use crate::batch::Control;
 use crate::error::InvalidInput;
 
 /// Solutions of many targets in one flat table.
+///
+/// ```
+/// use tdcr::batch::{Control, pool};
+/// use tdcr::planar::{TwoSections, solution_rows};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let two = TwoSections::new(0.14, 0.12, std::f64::consts::TAU)?;
+/// let targets = [[0.2, 0.06], [1.0, 0.0]];
+/// let threads = pool(Some(1))?;
+/// let rows = solution_rows(&two, &targets, &threads, &Control::default()).unwrap_or_default();
+/// // The second target is out of reach.
+/// assert_eq!((rows.counts[0], rows.counts[1]), (rows.turns.len(), 0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ManySolutions {
+pub struct SolutionRows {
     /// Turns of all solutions, target by target, each by bending energy \[rad\].
     pub turns: Vec<[f64; 2]>,
     /// Number of solutions of every target.
@@ -26,14 +41,14 @@ const TARGETS_PER_JOB: usize = 256;
 /// Every solution of every target (x, y) \[m\], in their order whatever the number of threads.
 /// Returns `None` when it was stopped.
 #[must_use]
-pub fn solve_many(
+pub fn solution_rows(
     two: &TwoSections,
     targets: &[[f64; 2]],
     pool: &ThreadPool,
     control: &Control,
-) -> Option<ManySolutions> {
+) -> Option<SolutionRows> {
     let job = |targets: &[[f64; 2]]| {
-        let mut part = ManySolutions::default();
+        let mut part = SolutionRows::default();
         let mut found = Vec::new();
         for &[x, y] in targets {
             if control.stop.load(Ordering::Relaxed) {
@@ -46,12 +61,12 @@ pub fn solve_many(
         }
         part
     };
-    let parts: Vec<ManySolutions> =
+    let parts: Vec<SolutionRows> =
         pool.install(|| targets.par_chunks(TARGETS_PER_JOB).map(job).collect());
     if control.stop.load(Ordering::Relaxed) {
         return None;
     }
-    let mut whole = ManySolutions {
+    let mut whole = SolutionRows {
         turns: Vec::with_capacity(parts.iter().map(|part| part.turns.len()).sum()),
         counts: Vec::with_capacity(targets.len()),
     };

@@ -1,4 +1,4 @@
-//! How far a bent trunk stays from circles: exact, arc by arc.
+//! Distance of a bent trunk from circles: exact, arc by arc.
 
 use std::f64::consts::TAU;
 
@@ -9,6 +9,17 @@ use super::trunk::Trunk;
 use crate::error::{InvalidInput, finite, positive};
 
 /// A disk that the axis of the trunk has to stay out of.
+///
+/// ```
+/// use tdcr::planar::{Circle, Trunk};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let trunk = Trunk::new(vec![0.14], 0.06)?;
+/// let circle = Circle::new(0.07, 0.05, 0.02)?;
+/// assert!((trunk.clearance(&[0.0], &[circle]) - 0.03).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circle {
     /// Its middle \[m\].

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Vector3;
 
-use super::tip_equations::{Problem, Work, eliminate};
+use super::tip_equations::{Scratch, TipEquations, eliminate};
 
 /// Largest gradient of the energy along the target that counts as none, over the energy's own.
 const STATIONARY: f64 = 1e-11;
@@ -16,42 +16,45 @@ const STUCK: f64 = 1e-12;
 /// onto the target. Returns whether it ended at a minimum, and the steps taken; `stop` ends it where
 /// it is.
 pub(super) fn descend(
-    problem: &Problem,
+    problem: &TipEquations,
     turns: &mut Vec<f64>,
     tolerance: f64,
     most: usize,
     stop: &AtomicBool,
-    work: &mut Work,
+    work: &mut Scratch,
 ) -> (bool, usize) {
     let (mut energy, mut damping) = (problem.energy(turns), 0.0);
     let mut hold = false;
     let mut trial = turns.clone();
     // With as many free turns the target leaves no choice.
-    let choice = 2 + usize::from(problem.heading.is_some());
+    let constraints = 2 + usize::from(problem.heading.is_some());
     for steps in 0..most {
         if stop.load(Ordering::Relaxed) {
             return (false, steps);
         }
+        // Multipliers of the target, free turns, gradient of the energy along the target.
         problem.linearize(turns, work);
-        let (multipliers, slope) = reduced(problem, turns, work);
+        let (multipliers, slope) = reduced_gradient(problem, turns, work);
         let mut free = work.free.iter().filter(|free| **free).count();
-        if free <= choice || slope <= STATIONARY * (2.0 * energy).sqrt().max(1e-3) {
+        if free <= constraints || slope <= STATIONARY * (2.0 * energy).sqrt().max(1e-3) {
             return (true, steps);
         }
+        // Newton step in the tangent of the target. Where no damping helps, a turn whose limit leaves nothing of the
+        // step is fixed for this step.
         tangent_step(problem, turns, &multipliers, damping, work);
         trial.clone_from(turns);
-        // Where no damping helps, a turn whose limit leaves nothing of the step is held for this step.
-        while let Some(stuck) = to_the_limit(problem, &mut trial, work).filter(|_| hold) {
+        while let Some(stuck) = step_to_limit(problem, &mut trial, work).filter(|_| hold) {
             work.free[stuck] = false;
             free -= 1;
-            if free <= choice {
+            if free <= constraints {
                 break;
             }
             tangent_step(problem, turns, &multipliers, damping, work);
             trial.clone_from(turns);
         }
-        let used_up = hold && free <= choice;
-        let on = !used_up && problem.reach(&mut trial, work) <= tolerance;
+        // Back onto the target: the step counts if the energy falls.
+        let no_freedom = hold && free <= constraints;
+        let on = !no_freedom && problem.move_onto_target(&mut trial, work) <= tolerance;
         let next = problem.energy(&trial);
         if on && next < energy {
             let small = energy - next < 1e-15 * energy;
@@ -64,7 +67,7 @@ pub(super) fn descend(
             }
         } else {
             // The limits leave no step.
-            if used_up {
+            if no_freedom {
                 return (true, steps);
             }
             if damping > 1e8 {
@@ -76,6 +79,7 @@ pub(super) fn descend(
                 (hold, damping) = (true, 0.0);
                 continue;
             }
+            // A shorter step next time.
             damping = (10.0 * damping).max(0.1);
         }
     }
@@ -84,7 +88,7 @@ pub(super) fn descend(
 
 /// Takes the step, or the part of it up to the first limit on the way; holds the turns at limits.
 /// Returns the turn whose limit leaves nothing of the step.
-fn to_the_limit(problem: &Problem, turns: &mut [f64], work: &mut Work) -> Option<usize> {
+fn step_to_limit(problem: &TipEquations, turns: &mut [f64], work: &mut Scratch) -> Option<usize> {
     let mut share = 1.0_f64;
     let mut first = None;
     for (i, (turn, step)) in turns.iter().zip(&work.step).enumerate() {
@@ -94,21 +98,25 @@ fn to_the_limit(problem: &Problem, turns: &mut [f64], work: &mut Work) -> Option
             (share, first) = ((room / step.abs()).max(0.0), Some(i));
         }
     }
-    work.held.clear();
-    work.held.extend(work.free.iter().map(|free| !free));
+    work.fixed.clear();
+    work.fixed.extend(work.free.iter().map(|free| !free));
     for (turn, step) in turns.iter_mut().zip(&work.step) {
         *turn += share * step;
     }
     if let Some(i) = first {
         turns[i] = problem.limits[i].copysign(work.step[i]);
-        work.held[i] = true;
+        work.fixed[i] = true;
     }
     first.filter(|_| share <= STUCK)
 }
 
 /// Multipliers of the target by least squares over the free turns, and the size of the energy's
 /// gradient that they leave. A turn at its limit is free when the energy would have it come back.
-fn reduced(problem: &Problem, turns: &[f64], work: &mut Work) -> (Vector3<f64>, f64) {
+fn reduced_gradient(
+    problem: &TipEquations,
+    turns: &[f64],
+    work: &mut Scratch,
+) -> (Vector3<f64>, f64) {
     let n = turns.len();
     work.free.clear();
     work.free.extend(turns.iter().zip(&problem.limits).map(|(turn, limit)| turn.abs() < *limit));
@@ -138,11 +146,11 @@ fn reduced(problem: &Problem, turns: &[f64], work: &mut Work) -> (Vector3<f64>, 
 /// Newton step of the energy on the linearised target: the saddle-point system of the free turns and
 /// the multipliers, with the second derivatives of the target.
 fn tangent_step(
-    problem: &Problem,
+    problem: &TipEquations,
     turns: &[f64],
     multipliers: &Vector3<f64>,
     damping: f64,
-    work: &mut Work,
+    work: &mut Scratch,
 ) {
     let n = turns.len();
     let held = if problem.heading.is_some() { 3 } else { 2 };
@@ -157,7 +165,7 @@ fn tangent_step(
             continue;
         }
         for j in (0..n).filter(|j| work.free[*j]) {
-            let second = Problem::second(work, i, j);
+            let second = TipEquations::second(work, i, j);
             work.matrix[size * i + j] = multipliers.x * second.re + multipliers.y * second.im;
         }
         work.matrix[size * i + i] += (1.0 + damping) / problem.lengths[i];
@@ -168,7 +176,7 @@ fn tangent_step(
         }
         work.step[i] = -turns[i] / problem.lengths[i];
     }
-    let Work { matrix, step, .. } = work;
+    let Scratch { matrix, step, .. } = work;
     eliminate(matrix, step);
     work.step.truncate(n);
 }

@@ -18,11 +18,11 @@ mod trunk;
 mod two_section;
 
 pub use angle_function::{AngleFunction, Curve};
-pub use batch::{ManySolutions, inverse_rows, solve_many};
+pub use batch::{SolutionRows, inverse_rows, solution_rows};
 pub use clearance::Circle;
 pub use newton_inverse::{Goal, Inverse, InverseSettings, inverse, inverse_until, polish};
 pub use swarm::{
     Row, Rows, SwarmInverse, SwarmSettings, SwarmSolver, Unknowns, WatchDecision, solve_rows,
 };
-pub use trunk::{Bent, Cables, Trunk};
+pub use trunk::{CableTurns, Cables, Trunk};
 pub use two_section::TwoSections;

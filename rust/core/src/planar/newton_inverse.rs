@@ -5,13 +5,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use nalgebra::Vector2;
 
 use super::least_energy::descend;
-use super::tip_equations::{HEADING, Problem, Work};
+use super::tip_equations::{HEADING_WEIGHT, Scratch, TipEquations};
 use super::trunk::Trunk;
 use super::two_section::TwoSections;
 use crate::error::{InvalidInput, finite};
 use crate::status::Status;
 
-/// What is asked of the tip.
+/// Goal of the tip.
+///
+/// ```
+/// use nalgebra::Vector2;
+/// use tdcr::planar::Goal;
+///
+/// // The tip at (0.2, 0.06) m, pointing along x; no section turns by more than 3 rad.
+/// let goal = Goal { point: Vector2::new(0.2, 0.06), heading: Some(0.0), limits: vec![3.0] };
+/// assert_eq!(goal.limits.len(), 1);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Goal {
     /// Position \[m\].
@@ -22,7 +31,14 @@ pub struct Goal {
     pub limits: Vec<f64>,
 }
 
-/// How precisely and from how many starts.
+/// Settings of the inverse: tolerance, steps, starts.
+///
+/// ```
+/// use tdcr::planar::InverseSettings;
+///
+/// let settings = InverseSettings { starts: 100, ..InverseSettings::default() };
+/// assert!(settings.validate().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseSettings {
     /// Miss of the target that counts as none \[m\]; a heading counts one trunk length per whole turn.
@@ -60,6 +76,20 @@ impl InverseSettings {
 }
 
 /// Turns found, and how well they do.
+///
+/// ```
+/// use nalgebra::Vector2;
+/// use tdcr::planar::{Goal, InverseSettings, Trunk, inverse};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let trunk = Trunk::new(vec![0.14, 0.12, 0.1], 0.06)?;
+/// let goal = Goal { point: Vector2::new(0.25, 0.1), heading: None, limits: vec![3.0] };
+/// let found = inverse(&trunk, &goal, &InverseSettings::default())?;
+/// assert_eq!(found.status, tdcr::Status::Converged);
+/// assert!(found.error < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inverse {
     /// Turn of every section \[rad\].
@@ -90,10 +120,10 @@ pub fn inverse(
 ) -> Result<Inverse, InvalidInput> {
     let mut solver = Solver::new(trunk, goal, settings)?;
     let starts = solver.search();
-    Ok(solver.answer(starts))
+    Ok(solver.into_inverse(starts))
 }
 
-/// As [`inverse`], until `stop` is set, which is looked at in every step: then there is no answer.
+/// Inverse that a flag stops: [`inverse`], with no answer once `stop` is set, which every step reads.
 ///
 /// # Errors
 /// As [`inverse`].
@@ -105,10 +135,10 @@ pub fn inverse_until(
 ) -> Result<Option<Inverse>, InvalidInput> {
     let mut solver = Solver { stop, ..Solver::new(trunk, goal, settings)? };
     let starts = solver.search();
-    Ok((!solver.stopped()).then(|| solver.answer(starts)))
+    Ok((!solver.is_stopped()).then(|| solver.into_inverse(starts)))
 }
 
-/// As [`inverse`], from given turns alone: the least energy near them, or the nearest point.
+/// Inverse from given turns alone: the least energy near them, or the nearest point.
 ///
 /// # Errors
 /// As [`inverse`], and for turns that do not fit the trunk.
@@ -124,7 +154,7 @@ pub fn polish(
     if solver.best.is_none() {
         solver.try_nearest(turns);
     }
-    Ok(solver.answer(1))
+    Ok(solver.into_inverse(1))
 }
 
 /// The flag of a search that nobody stops.
@@ -132,12 +162,12 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// The problem, its buffers and the best answers so far.
 pub(super) struct Solver<'a> {
-    pub(super) problem: Problem,
+    pub(super) problem: TipEquations,
     pub(super) heading: Option<f64>,
-    pub(super) whole: f64,
+    pub(super) total_length: f64,
     pub(super) settings: &'a InverseSettings,
     pub(super) stop: &'a AtomicBool,
-    pub(super) work: Work,
+    pub(super) work: Scratch,
     pub(super) iterations: usize,
     /// Energy, whether it is stationary, turns.
     pub(super) best: Option<(f64, bool, Vec<f64>)>,
@@ -167,24 +197,24 @@ impl<'a> Solver<'a> {
             let expected = "turns above 0 and up to 2 pi [rad]";
             return Err(InvalidInput::new("limit", expected, format!("{bad:?}")));
         }
-        let whole: f64 = trunk.lengths().iter().sum();
-        let lengths = trunk.lengths().iter().map(|length| length / whole).collect();
-        let target = super::chord::Point::new(x / whole, y / whole);
-        let problem = Problem { lengths, limits, target, heading };
+        let total_length: f64 = trunk.lengths().iter().sum();
+        let lengths = trunk.lengths().iter().map(|length| length / total_length).collect();
+        let target = super::chord::Point::new(x / total_length, y / total_length);
+        let problem = TipEquations { lengths, limits, target, heading };
         Ok(Self {
             problem,
             heading,
-            whole,
+            total_length,
             settings,
             stop: &NEVER,
-            work: Work::default(),
+            work: Scratch::default(),
             iterations: 0,
             best: None,
             nearest: None,
         })
     }
 
-    fn stopped(&self) -> bool {
+    fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
@@ -221,8 +251,8 @@ impl<'a> Solver<'a> {
             let Ok(two) = TwoSections::new(l1, l2, std::f64::consts::TAU) else { continue };
             two.solutions(self.problem.target.re, self.problem.target.im, &mut found);
             for turns in &found {
-                let spread = |(group, (turn, whole)): (&[f64], (f64, f64))| {
-                    group.iter().map(move |l| turn * l / whole).collect::<Vec<f64>>()
+                let spread = |(group, (turn, group_length)): (&[f64], (f64, f64))| {
+                    group.iter().map(move |l| turn * l / group_length).collect::<Vec<f64>>()
                 };
                 let parts = groups.into_iter().zip([(turns[0], l1), (turns[1], l2)]);
                 starts.push(parts.flat_map(spread).collect());
@@ -263,7 +293,7 @@ impl<'a> Solver<'a> {
         Some(two.nearest(self.problem.target.re, self.problem.target.im).0.to_vec())
     }
 
-    /// Whole turns of the heading do not matter: those nearest to a start's are taken.
+    /// Adds whole turns to the heading, those nearest to a start's sum of turns.
     pub(super) fn unwind(&mut self, start: &[f64]) {
         let turn = std::f64::consts::TAU;
         let sum: f64 = start.iter().sum();
@@ -271,19 +301,21 @@ impl<'a> Solver<'a> {
     }
 
     pub(super) fn try_start(&mut self, start: &[f64]) {
-        if self.stopped() {
+        if self.is_stopped() {
             return;
         }
         self.unwind(start);
         let mut turns = start.to_vec();
-        self.work.held.clear();
-        if self.problem.reach(&mut turns, &mut self.work) * self.whole > self.settings.tolerance {
+        self.work.fixed.clear();
+        if self.problem.move_onto_target(&mut turns, &mut self.work) * self.total_length
+            > self.settings.tolerance
+        {
             return;
         }
         let (stationary, steps) = descend(
             &self.problem,
             &mut turns,
-            self.settings.tolerance / self.whole,
+            self.settings.tolerance / self.total_length,
             self.settings.max_iterations,
             self.stop,
             &mut self.work,
@@ -296,38 +328,38 @@ impl<'a> Solver<'a> {
     }
 
     pub(super) fn try_nearest(&mut self, start: &[f64]) {
-        if self.stopped() {
+        if self.is_stopped() {
             return;
         }
         self.unwind(start);
         let mut turns = start.to_vec();
-        let (miss, flat) = self.problem.approach(&mut turns, &mut self.work);
+        let (miss, flat) = self.problem.minimize_miss(&mut turns, &mut self.work);
         if self.nearest.as_ref().is_none_or(|(least, _, _)| miss < least * (1.0 - 1e-12)) {
             self.nearest = Some((miss, flat, turns));
         }
     }
 
-    pub(super) fn answer(mut self, starts: usize) -> Inverse {
-        let (converged, settled, turns) = match (self.best.take(), self.nearest.take()) {
-            (Some((_, settled, turns)), _) => (true, settled, turns),
-            (None, Some((_, settled, turns))) => (false, settled, turns),
+    pub(super) fn into_inverse(mut self, starts: usize) -> Inverse {
+        let (converged, stationary, turns) = match (self.best.take(), self.nearest.take()) {
+            (Some((_, stationary, turns)), _) => (true, stationary, turns),
+            (None, Some((_, stationary, turns))) => (false, stationary, turns),
             (None, None) => (false, false, vec![0.0; self.problem.lengths.len()]),
         };
         self.unwind(&turns);
         let off = self.problem.linearize(&turns, &mut self.work);
-        let error = self.whole * off.x.hypot(off.y);
-        let miss = self.whole * off.norm();
+        let error = self.total_length * off.x.hypot(off.y);
+        let miss = self.total_length * off.norm();
         // A nearest point may turn out to be the target.
         let converged = converged || miss <= self.settings.tolerance;
-        let status = match (converged, settled) {
+        let status = match (converged, stationary) {
             (true, true) => Status::Converged,
             (false, true) => Status::Unreachable,
             (_, false) => Status::IterationLimit,
         };
         Inverse {
             error,
-            heading_error: off.z / HEADING,
-            energy: self.problem.energy(&turns) / self.whole,
+            heading_error: off.z / HEADING_WEIGHT,
+            energy: self.problem.energy(&turns) / self.total_length,
             turns,
             status,
             iterations: self.iterations,

@@ -5,9 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::chord::{Chord, Point};
 
-/// A tip to reach: position, and heading where one is wanted.
+/// Equations of the tip: position, and heading where one is asked for.
 #[derive(Clone, Debug)]
-pub(super) struct Problem {
+pub(super) struct TipEquations {
     pub(super) lengths: Vec<f64>,
     pub(super) limits: Vec<f64>,
     pub(super) target: Point,
@@ -16,69 +16,69 @@ pub(super) struct Problem {
 }
 
 /// Misses of the heading count as lengths at this rate \[1/rad\]: a whole turn as the trunk's length.
-pub(super) const HEADING: f64 = 1.0 / std::f64::consts::TAU;
+pub(super) const HEADING_WEIGHT: f64 = 1.0 / std::f64::consts::TAU;
 
 /// Buffers of the iterations, and what the last linearisation found.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Work {
+pub(super) struct Scratch {
     /// Derivatives of the tip by every turn.
-    pub(super) by: Vec<Point>,
+    pub(super) first: Vec<Point>,
     /// Second derivative of the tip by a turn twice.
-    pub(super) twice: Vec<Point>,
+    pub(super) second: Vec<Point>,
     pub(super) free: Vec<bool>,
-    /// Turns that [`Problem::reach`] leaves as they are.
-    pub(super) held: Vec<bool>,
+    /// Turns that [`TipEquations::move_onto_target`] leaves as they are.
+    pub(super) fixed: Vec<bool>,
     pub(super) trial: Vec<f64>,
     pub(super) step: Vec<f64>,
     pub(super) matrix: Vec<f64>,
     ends: Vec<Point>,
 }
 
-impl Problem {
+impl TipEquations {
     /// Misses of position and heading; fills the derivatives in `work`.
-    pub(super) fn linearize(&self, turns: &[f64], work: &mut Work) -> Vector3<f64> {
+    pub(super) fn linearize(&self, turns: &[f64], work: &mut Scratch) -> Vector3<f64> {
         let (mut at, mut frame) = (Point::new(0.0, 0.0), Point::new(1.0, 0.0));
-        work.by.clear();
-        work.twice.clear();
+        work.first.clear();
+        work.second.clear();
         work.ends.clear();
         for (turn, length) in turns.iter().zip(&self.lengths) {
             let chord = Chord::new(*turn);
             let unit = frame * *length;
             at += unit * chord.value;
-            work.by.push(unit * chord.first);
-            work.twice.push(unit * chord.second);
+            work.first.push(unit * chord.first);
+            work.second.push(unit * chord.second);
             work.ends.push(at);
             frame *= chord.heading;
         }
         for (i, end) in work.ends.iter().enumerate() {
             // What lies beyond the section turns with it.
             let beyond = at - end;
-            work.by[i] += Point::new(-beyond.im, beyond.re);
-            work.twice[i] -= beyond;
+            work.first[i] += Point::new(-beyond.im, beyond.re);
+            work.second[i] -= beyond;
         }
         let off = at - self.target;
         Vector3::new(off.re, off.im, self.heading_miss(turns))
     }
 
     fn heading_miss(&self, turns: &[f64]) -> f64 {
-        self.heading.map_or(0.0, |heading| HEADING * (turns.iter().sum::<f64>() - heading))
+        self.heading.map_or(0.0, |heading| HEADING_WEIGHT * (turns.iter().sum::<f64>() - heading))
     }
 
     /// Row of the misses' derivative by turn i.
-    pub(super) fn row(&self, work: &Work, i: usize) -> Vector3<f64> {
+    pub(super) fn row(&self, work: &Scratch, i: usize) -> Vector3<f64> {
         Vector3::new(
-            work.by[i].re,
-            work.by[i].im,
-            if self.heading.is_some() { HEADING } else { 0.0 },
+            work.first[i].re,
+            work.first[i].im,
+            if self.heading.is_some() { HEADING_WEIGHT } else { 0.0 },
         )
     }
 
     /// Second derivative of the tip by turns i and j: what lies beyond section i turns with it.
-    pub(super) fn second(work: &Work, i: usize, j: usize) -> Point {
+    pub(super) fn second(work: &Scratch, i: usize, j: usize) -> Point {
         if i == j {
-            return work.twice[i];
+            return work.second[i];
         }
-        let later = work.by[i.max(j)];
+        let later = work.first[i.max(j)];
         Point::new(-later.im, later.re)
     }
 
@@ -110,11 +110,11 @@ impl Problem {
 
     /// The change of least energy that takes the misses away to first order, `damping` added to the
     /// matrix of the normal equations.
-    fn least_change(&self, turns: &[f64], off: &Vector3<f64>, damping: f64, work: &mut Work) {
+    fn least_change(&self, turns: &[f64], off: &Vector3<f64>, damping: f64, work: &mut Scratch) {
         let n = turns.len();
-        work.held.resize(n, false);
+        work.fixed.resize(n, false);
         work.free.clear();
-        work.free.extend(work.held.iter().map(|held| !held));
+        work.free.extend(work.fixed.iter().map(|fixed| !fixed));
         work.step.resize(n, 0.0);
         for _ in 0..=n {
             let multipliers = self.gram(work, damping) * off;
@@ -122,7 +122,7 @@ impl Problem {
                 let change = self.lengths[i] * self.row(work, i).dot(&multipliers);
                 work.step[i] = if work.free[i] { -change } else { 0.0 };
             }
-            let Work { step, free, .. } = work;
+            let Scratch { step, free, .. } = work;
             if !self.release(turns, step, free) {
                 return;
             }
@@ -130,7 +130,7 @@ impl Problem {
     }
 
     /// Inverse of `J W J^T + damping` over the free turns, W the inverse weights of the energy.
-    pub(super) fn gram(&self, work: &Work, damping: f64) -> Matrix3<f64> {
+    pub(super) fn gram(&self, work: &Scratch, damping: f64) -> Matrix3<f64> {
         let mut gram = Matrix3::zeros();
         for i in (0..self.lengths.len()).filter(|i| work.free[*i]) {
             let row = self.row(work, i);
@@ -145,7 +145,7 @@ impl Problem {
     }
 
     /// Moves the turns onto the target with little change, by damped Newton steps; returns the miss.
-    pub(super) fn reach(&self, turns: &mut Vec<f64>, work: &mut Work) -> f64 {
+    pub(super) fn move_onto_target(&self, turns: &mut Vec<f64>, work: &mut Scratch) -> f64 {
         self.clamp(turns);
         let mut off = self.linearize(turns, work);
         let (mut miss, mut damping) = (off.norm(), 0.0);
@@ -184,7 +184,7 @@ impl Problem {
 
     /// Moves the turns to where the miss has a local minimum, by Newton steps with the exact second
     /// derivatives. Returns the miss and whether the gradient vanishes there.
-    pub(super) fn approach(&self, turns: &mut Vec<f64>, work: &mut Work) -> (f64, bool) {
+    pub(super) fn minimize_miss(&self, turns: &mut Vec<f64>, work: &mut Scratch) -> (f64, bool) {
         let n = turns.len();
         self.clamp(turns);
         let mut off = self.linearize(turns, work);
@@ -224,8 +224,14 @@ impl Problem {
     }
 
     /// `(J^T J + sum off_k H_k + damping/lengths) step = -gradient`, entries of zero gradient at a
-    /// limit held.
-    fn damped_newton(&self, gradient: &[f64], off: &Vector3<f64>, damping: f64, work: &mut Work) {
+    /// limit fixed.
+    fn damped_newton(
+        &self,
+        gradient: &[f64],
+        off: &Vector3<f64>,
+        damping: f64,
+        work: &mut Scratch,
+    ) {
         let n = gradient.len();
         work.matrix.clear();
         work.matrix.resize(n * n, 0.0);
@@ -251,7 +257,7 @@ impl Problem {
     }
 }
 
-/// Solves a dense system in place by elimination with row pivots; a singular one gives what it gives.
+/// Solves a dense system in place by elimination with row pivots; where it is singular the unknown is zero.
 pub(super) fn eliminate(matrix: &mut [f64], right: &mut [f64]) {
     let n = right.len();
     for k in 0..n {

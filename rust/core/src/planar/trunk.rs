@@ -5,7 +5,18 @@ use nalgebra::Vector2;
 use super::chord::{Chord, Point};
 use crate::error::{InvalidInput, finite, length, positive};
 
-/// How the two cable lengths of a section are read.
+/// Reading of the two cable lengths of a section.
+///
+/// ```
+/// use tdcr::planar::{Cables, Trunk};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let trunk = Trunk::new(vec![0.14], 0.06)?;
+/// let [l1, l2] = trunk.cable_lengths(&[0.5], Cables::Arcs)?[0];
+/// assert!((l2 - l1 - 0.06 * 0.5).abs() < 1e-15);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Cables {
     /// Straight lines between the platforms (eq. 2): `l2 - l1 = 2 d sin(turn/2)`, |turn| up to pi.
@@ -31,6 +42,17 @@ impl Cables {
 
 /// A planar trunk: inextensible sections in a row, two cables along each at equal distances from the
 /// axis, cable 1 on the left (+y) and cable 2 on the right.
+///
+/// ```
+/// use tdcr::planar::Trunk;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let trunk = Trunk::new(vec![0.14, 0.12], 0.06)?;
+/// let (tip, heading) = trunk.platforms(&[0.5, -0.5])[1];
+/// assert!(tip.y > 0.0 && heading.abs() < 1e-15);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trunk {
     lengths: Vec<f64>,
@@ -38,8 +60,20 @@ pub struct Trunk {
 }
 
 /// Turns that cables give, and what of the cables is not used.
+///
+/// ```
+/// use tdcr::planar::{Cables, Trunk};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let trunk = Trunk::new(vec![0.14], 0.06)?;
+/// // The mean of the cables is 1 mm longer than the section.
+/// let read = trunk.turns(&[[0.126, 0.156]], Cables::Arcs)?;
+/// assert!((read.turns[0] - 0.5).abs() < 1e-12 && (read.misfit[0] - 0.001).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bent {
+pub struct CableTurns {
     /// Turn of every section \[rad\].
     pub turns: Vec<f64>,
     /// Mean cable length minus the one that fits the section, per section \[m\].
@@ -89,12 +123,12 @@ impl Trunk {
     /// # Errors
     /// `InvalidInput` for another number of pairs than sections, a length that is not positive, or
     /// chords that differ by more than twice the cable distance.
-    pub fn turns(&self, cables: &[[f64; 2]], reading: Cables) -> Result<Bent, InvalidInput> {
+    pub fn turns(&self, cables: &[[f64; 2]], reading: Cables) -> Result<CableTurns, InvalidInput> {
         if cables.len() != self.lengths.len() {
             let expected = format!("{} pairs (l1, l2), one per section", self.lengths.len());
             return Err(InvalidInput::new("cable_lengths", expected, cables.len()));
         }
-        let mut bent = Bent { turns: Vec::new(), misfit: Vec::new() };
+        let mut bent = CableTurns { turns: Vec::new(), misfit: Vec::new() };
         for (i, (&[l1, l2], section)) in cables.iter().zip(&self.lengths).enumerate() {
             for (k, cable) in [l1, l2].into_iter().enumerate() {
                 positive(&format!("cable_lengths[{i}][{k}]"), "m", cable)?;

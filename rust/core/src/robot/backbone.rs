@@ -8,7 +8,22 @@ use super::curve::rest_from_curve;
 use crate::error::{InvalidInput, finite, positive};
 use crate::hashing::{Bits, hash_by_bits};
 
-/// What a backbone is described by, before it is checked. See [`Backbone::new`].
+/// Description of a backbone, before it is checked. See [`Backbone::new`].
+///
+/// ```
+/// use tdcr::robot::{Backbone, BackboneSpec};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// // Spring steel of 1 mm.
+/// let spec = BackboneSpec {
+///     youngs_modulus: Some(200e9),
+///     diameter: Some(vec![1e-3]),
+///     ..BackboneSpec::straight(0.2, 20)
+/// };
+/// assert!(Backbone::new(spec)?.has_stiffness());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct BackboneSpec {
     /// Length of each stretch \[m\].
@@ -48,6 +63,17 @@ impl BackboneSpec {
 const MOST_SUBSEGMENTS: usize = 100_000;
 
 /// A checked backbone. Disks are numbered 0 (base) to n (tip); subsegment i joins disks i and i + 1.
+///
+/// ```
+/// use tdcr::robot::{Backbone, BackboneSpec};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// assert_eq!(backbone.subsegments(), 10);
+/// assert!(backbone.is_straight() && (backbone.total_length() - 0.2).abs() < 1e-15);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Backbone {
     spec: BackboneSpec,
@@ -60,9 +86,9 @@ impl Backbone {
     ///
     /// # Errors
     /// `InvalidInput` naming the field: no stretch, a length that is not positive, a stretch without
-    /// subsegments, more than 100,000 of them, Poisson's ratio outside (-1, 0.5], a rest shape of another length than the
-    /// backbone or bent by more than pi per subsegment, Young's modulus without diameter, a
-    /// modulus, diameter or disk radius that is not positive.
+    /// subsegments, more than 100,000 of them, Poisson's ratio outside (-1, 0.5], a rest shape of
+    /// another length than the backbone or bent by more than pi per subsegment, Young's modulus without
+    /// diameter, a modulus, diameter or disk radius that is not positive.
     pub fn new(mut spec: BackboneSpec) -> Result<Self, InvalidInput> {
         let stretches = spec.length.len();
         if stretches == 0 {
@@ -164,13 +190,13 @@ impl Backbone {
         self.spec.rest.as_ref().map_or_else(Vector3::zeros, |rest| rest[subsegment])
     }
 
-    /// Whether every subsegment is straight at rest.
+    /// True when every subsegment is straight at rest.
     #[must_use]
     pub fn is_straight(&self) -> bool {
         (self.spec.rest.iter().flatten()).all(|rest| *rest == Vector3::zeros())
     }
 
-    /// Whether forces come out in newtons: Young's modulus (and so the diameter) is known.
+    /// True when forces come out in newtons: Young's modulus (and so the diameter) is known.
     #[must_use]
     pub fn has_stiffness(&self) -> bool {
         self.spec.youngs_modulus.is_some()

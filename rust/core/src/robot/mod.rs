@@ -1,4 +1,4 @@
-//! What a robot is: checked once, immutable, its holes resolved.
+//! Robots: checked once, immutable, their holes resolved.
 
 mod backbone;
 mod curve;
@@ -15,6 +15,20 @@ use crate::hashing::{Bits, hash_by_bits};
 use crate::lie::{Pose, so3};
 
 /// A tendon as the robot sees it: where it ends and which hole it passes on each disk.
+///
+/// ```
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let path = &robot.paths()[0];
+/// assert_eq!(path.end(), 10);
+/// assert!((path.length(&robot.rest_frames()) - 0.2).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Path {
     /// Azimuth of the hole on each disk 0..end \[rad\].
@@ -52,6 +66,19 @@ impl Path {
 }
 
 /// A backbone with tendons, placed in the world.
+///
+/// ```
+/// use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// let tendons = vec![Tendon::straight(0.0, 0.01)?, Tendon::straight(2.0, 0.01)?];
+/// let robot = Robot::new(backbone, tendons, None, None, Some("finger".to_owned()))?;
+/// assert_eq!(robot.tendon_names(), ["t0", "t1"]);
+/// assert_eq!(robot.rest_frames().len(), 11);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Robot {
     backbone: Backbone,
@@ -93,7 +120,7 @@ impl Robot {
         Ok(Self { backbone, tendons, base, tool, name, tendon_names, paths })
     }
 
-    /// The same robot with another backbone.
+    /// Copy of the robot with another backbone.
     ///
     /// # Errors
     /// As [`Robot::new`], where the tendons do not fit it.
@@ -102,7 +129,7 @@ impl Robot {
         Ok(Self { base: self.base, tool: self.tool, ..new })
     }
 
-    /// The same robot with other tendons.
+    /// Copy of the robot with other tendons.
     ///
     /// # Errors
     /// As [`Robot::new`], where they do not fit it.

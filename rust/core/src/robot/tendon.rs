@@ -1,4 +1,4 @@
-//! Tendons and the ways to say which holes they pass.
+//! Tendons and the recipes of the holes that they pass.
 
 use std::f64::consts::TAU;
 
@@ -6,9 +6,17 @@ use crate::error::{InvalidInput, finite, length, positive};
 use crate::hashing::{Bits, hash_by_bits};
 
 /// One value for all disks, or one per disk 0..end.
+///
+/// ```
+/// use tdcr::robot::PerDisk;
+///
+/// let radius = PerDisk::Each(vec![0.010, 0.009, 0.008]);
+/// assert_eq!((radius.at(2), radius.count()), (0.008, Some(3)));
+/// assert_eq!(PerDisk::Same(0.01).at(7), 0.01);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum PerDisk {
-    /// The same on every disk.
+    /// One value on every disk.
     Same(f64),
     /// One per disk, disk 0 first.
     Each(Vec<f64>),
@@ -49,6 +57,18 @@ impl PerDisk {
 }
 
 /// The recipe by which a tendon's holes are found; kept as given, resolved by the robot.
+///
+/// ```
+/// use tdcr::robot::{PerDisk, Routing, Tendon};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// // Half a turn about the backbone, 10 mm from it, up to disk 8.
+/// let routing = Routing::Helical { azimuth: 0.0, radius: 0.01, turns: 0.5 };
+/// let tendon = Tendon::new(routing, Some(8), None, None)?;
+/// assert_eq!(tendon.end(), Some(8));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Routing {
     /// Azimuth \[rad\] and radius \[m\] of the hole on each disk; both constant is straight routing.
@@ -81,6 +101,16 @@ pub enum Routing {
 }
 
 /// A cable, by its recipe.
+///
+/// ```
+/// use tdcr::robot::Tendon;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let tendon = Tendon::straight(0.0, 0.01)?;
+/// assert_eq!((tendon.end(), tendon.stiffness()), (None, None));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tendon {
     routing: Routing,
@@ -133,13 +163,13 @@ impl Tendon {
         &self.routing
     }
 
-    /// Disk where it terminates, if said; else the tip.
+    /// Disk where it terminates, if stated; else the tip.
     #[must_use]
     pub fn end(&self) -> Option<usize> {
         self.end
     }
 
-    /// Axial stiffness EA \[N\], if said; else rigid.
+    /// Axial stiffness EA \[N\], if stated; else rigid.
     #[must_use]
     pub fn stiffness(&self) -> Option<f64> {
         self.stiffness

@@ -11,7 +11,7 @@ use super::dual_newton::{DualNewton, Ending};
 use super::newton_system::{Chain, Left};
 use super::plan::Plan;
 use super::subsegment::{Derivatives, Local, Piece};
-use crate::solve::quadratic_program::dot;
+use crate::solve::dense::dot;
 
 /// A piece whose length changes by less than this share of itself per radian has no leverage.
 const BLIND: f64 = 1e-4;

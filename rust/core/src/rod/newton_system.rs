@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::plan::Plan;
 use super::subsegment::{Derivatives, Local, ROUNDING};
 use crate::lie::Pose;
-use crate::solve::bounded_program::Bounded;
-use crate::solve::quadratic_program::{backward, cholesky, dot, forward};
+use crate::solve::bounded_program::BoundedProgram;
+use crate::solve::dense::{backward, cholesky, dot, forward};
 
 /// Unknowns and the buffers of a Newton step.
 #[derive(Clone, Debug, Default)]
@@ -51,7 +51,7 @@ pub(super) struct Chain {
     reduced: Vec<f64>,
     right: Vec<f64>,
     least: Vec<f64>,
-    program: Bounded,
+    program: BoundedProgram,
     whole: Vec<f64>,
 }
 

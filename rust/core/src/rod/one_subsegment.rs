@@ -10,7 +10,7 @@ use super::dual_newton::EASY;
 use super::newton_system::{Chain, JUMP};
 use super::plan::Plan;
 use crate::lie::Pose;
-use crate::solve::quadratic_program::{backward, dot};
+use crate::solve::dense::{backward, dot};
 
 /// Newton steps per load step, and load steps are not made shorter.
 const PATIENCE: usize = 20;

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::element::Element;
 use super::settings::Subsegment;
 use crate::lie::Pose;
-use crate::solve::quadratic_program::{backward, dot, forward};
+use crate::solve::dense::{backward, dot, forward};
 
 /// A tendon between two disks: its holes in the frames of the base disk and of the next one.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::plan::Plan;
 use super::subsegment::Local;
 use crate::lie::Pose;
-use crate::solve::quadratic_program::forward;
+use crate::solve::dense::forward;
 
 /// A solved rod: strains, factors of the subsegments' Hessians, and the frame of every disk.
 pub(super) struct Solved<'a> {

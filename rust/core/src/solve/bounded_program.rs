@@ -4,15 +4,24 @@
 //! Variables leave their bounds one by one, so that ones that depend on those already free stay where they
 //! are: a singular matrix, as of tendons of which some are slack, costs no precision.
 
-use super::quadratic_program::{backward, cholesky, forward};
+use super::dense::{backward, cholesky, forward};
 
 /// Gradients below this share of the largest linear term that pulls a variable off its bound count as zero: how far
 /// others are pushed onto theirs does not round those.
 const FLAT: f64 = 1e-14;
 
 /// Buffers, and the answer.
+///
+/// ```
+/// use tdcr::solve::bounded_program::BoundedProgram;
+///
+/// // min x² / 2 + y² / 2 - x + y with x, y >= 0.
+/// let mut program = BoundedProgram::default();
+/// assert!(program.solve(&[1.0, 0.0, 0.0, 1.0], &[1.0, -1.0], &[0.0, 0.0], |_| false));
+/// assert_eq!(program.step, [1.0, 0.0]);
+/// ```
 #[derive(Clone, Debug, Default)]
-pub struct Bounded {
+pub struct BoundedProgram {
     /// The minimiser.
     pub step: Vec<f64>,
     /// Free variables, in the order of the factor.
@@ -21,7 +30,7 @@ pub struct Bounded {
     trial: Vec<f64>,
 }
 
-impl Bounded {
+impl BoundedProgram {
     /// Minimises `x·M x / 2 − right·x` subject to `x ≥ lower`, where `lower ≤ 0`, from zero; variables with
     /// `first` start free. `matrix` is symmetric, row by row, of which the lower triangle is read. False when
     /// the arithmetic breaks down or the active set goes on changing.
@@ -67,6 +76,7 @@ impl Bounded {
             if count == 0 {
                 return true;
             }
+            // M and right-hand side of the free variables, the others fixed.
             self.factor.clear();
             self.trial.clear();
             for (a, &i) in self.free.iter().enumerate() {
@@ -75,11 +85,13 @@ impl Bounded {
                 let fixed = (0..right.len()).filter(|j| !self.free.contains(j));
                 self.trial.push(right[i] - fixed.map(|j| at(i, j) * self.step[j]).sum::<f64>());
             }
+            // Their unconstrained minimum.
             if !cholesky(&mut self.factor, count) {
                 return false;
             }
             forward(&self.factor, count, &mut self.trial);
             backward(&self.factor, count, &mut self.trial);
+            // Share of the way until the first of them meets its bound.
             let (mut share, mut first) = (1.0_f64, None);
             for (a, &i) in self.free.iter().enumerate() {
                 let (from, to) = (self.step[i], self.trial[a]);
@@ -95,6 +107,7 @@ impl Bounded {
                 let moved = self.step[i] + share * (self.trial[a] - self.step[i]);
                 self.step[i] = moved.max(lower[i]);
             }
+            // Variables on their bounds are free no more.
             let Some(first) = first else { return true };
             self.step[first] = lower[first];
             let step = &self.step;

@@ -2,6 +2,7 @@
 
 pub mod bounded_program;
 pub mod convex_region;
+pub(crate) mod dense;
 pub mod levenberg_marquardt;
 pub mod pseudo_inverse;
 pub mod pso;

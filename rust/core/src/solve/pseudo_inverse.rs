@@ -6,6 +6,16 @@ use nalgebra::{DMatrix, DVector};
 const DEFICIENT: f64 = 1e-10;
 
 /// The Moore-Penrose inverse of a matrix, by its singular value decomposition.
+///
+/// ```
+/// use nalgebra::{DMatrix, DVector};
+/// use tdcr::solve::pseudo_inverse::PseudoInverse;
+///
+/// // One equation, two unknowns: the shortest answer.
+/// let inverse = PseudoInverse::new(&DMatrix::from_row_slice(1, 2, &[1.0, 1.0]));
+/// assert_eq!(inverse.rank, 1);
+/// assert!((inverse.solve(&DVector::from_vec(vec![2.0])) - DVector::from_vec(vec![1.0; 2])).amax() < 1e-14);
+/// ```
 #[derive(Clone, Debug)]
 pub struct PseudoInverse {
     /// The inverse itself: columns x rows of the matrix.
@@ -17,7 +27,7 @@ pub struct PseudoInverse {
 }
 
 impl PseudoInverse {
-    /// Of a matrix with finite entries.
+    /// Pseudo-inverse of a matrix with finite entries.
     #[must_use]
     pub fn new(matrix: &DMatrix<f64>) -> Self {
         let (rows, columns) = matrix.shape();

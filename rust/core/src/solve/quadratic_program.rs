@@ -5,15 +5,25 @@
 //! constraints matter costs one Cholesky factorisation. The active rows, in the Hessian's metric, are kept
 //! as an orthonormal basis and a triangle; when one leaves, which is rare, the basis is made anew.
 
+use super::dense::{backward, cholesky, dot, forward};
+
 /// Constraints `normal_k . p = offset_k` for the first `equalities` rows, `normal_k . p <= offset_k` for
 /// the rest. Normals are about as long as 1.
+///
+/// ```
+/// use tdcr::solve::quadratic_program::Rows;
+///
+/// let mut rows = Rows::default();
+/// rows.push(2, 1.0).copy_from_slice(&[1.0, 0.0]);
+/// assert!(rows.allow(2, &[0.5, 9.0]) && !rows.allow(2, &[1.5, 0.0]));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
     /// Normals one after the other, as many numbers each as there are unknowns.
     pub normals: Vec<f64>,
     /// Right-hand sides.
     pub offsets: Vec<f64>,
-    /// How many of the rows, from the first, are equations.
+    /// Number of equations, which are the first rows.
     pub equalities: usize,
 }
 
@@ -33,7 +43,7 @@ impl Rows {
         &mut self.normals[start..]
     }
 
-    /// Whether a step meets all rows, to rounding.
+    /// True when a step meets all rows, to rounding.
     #[must_use]
     pub fn allow(&self, size: usize, step: &[f64]) -> bool {
         self.offsets.iter().enumerate().all(|(k, offset)| {
@@ -49,14 +59,27 @@ impl Rows {
     }
 }
 
-/// How a program ended.
+/// Outcome of a program.
+///
+/// ```
+/// use tdcr::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
+///
+/// // p <= -1 and -p <= -1 exclude each other.
+/// let mut rows = Rows::default();
+/// rows.push(1, -1.0)[0] = 1.0;
+/// rows.push(1, -1.0)[0] = -1.0;
+/// let mut program = QuadraticProgram::default();
+/// program.factor_identity(1);
+/// program.gradient = vec![0.0];
+/// assert_eq!(program.solve(&rows), Outcome::Infeasible);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The minimum.
     Solved,
     /// No point meets the constraints.
     Infeasible,
-    /// The arithmetic broke down, or the active set went on changing.
+    /// The arithmetic broke down, or the active set kept changing.
     Failed,
 }
 
@@ -66,8 +89,8 @@ const MET: f64 = 1e-13;
 /// An equation is dependent on others when the square of its part outside them, in the Hessian's metric, is
 /// this small a share of it: rows of a Jacobian near where it is singular.
 const DEPENDENT: f64 = 1e-11;
-/// The same for an inequality: independent rows come as near as the inverse of the Hessian's condition
-/// (1e13 for least squares with freedom left), dependent ones as near as the rounding of their images.
+/// Dependence of an inequality: independent rows come as near as the inverse of the Hessian's condition
+/// (1e13 for least squares with freedom), dependent ones as near as the rounding of their whitened rows.
 const PARALLEL: f64 = 1e-16;
 
 /// A row that depends on active ones contradicts them when it is violated by more than this; below, it is
@@ -75,8 +98,22 @@ const PARALLEL: f64 = 1e-16;
 const CONTRADICTION: f64 = 1e-9;
 
 /// Buffers of a solve, and its answer.
+///
+/// ```
+/// use tdcr::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
+///
+/// // min |p|² / 2 - 2 p_0 with p_0 + p_1 <= 1.
+/// let mut rows = Rows::default();
+/// rows.push(2, 1.0).copy_from_slice(&[1.0, 1.0]);
+/// let mut program = QuadraticProgram::default();
+/// program.factor_identity(2);
+/// program.gradient = vec![-2.0, 0.0];
+/// assert_eq!(program.solve(&rows), Outcome::Solved);
+/// assert!((program.step[0] - 1.5).abs() < 1e-12 && (program.step[1] + 0.5).abs() < 1e-12);
+/// assert!((program.multipliers[0] - 0.5).abs() < 1e-12);
+/// ```
 #[derive(Clone, Debug, Default)]
-pub struct Quadratic {
+pub struct QuadraticProgram {
     size: usize,
     /// Cholesky factor of the Hessian, lower, row by row, its diagonal inverted.
     factor: Vec<f64>,
@@ -91,70 +128,22 @@ pub struct Quadratic {
     /// Rows that depend on active ones and hold as nearly as these do.
     implied: Vec<usize>,
     /// `L^-1 normal` of every active row.
-    images: Vec<f64>,
+    whitened_rows: Vec<f64>,
     /// Orthonormal basis of these.
     basis: Vec<f64>,
     /// The images in the basis: column k has k + 1 numbers, one column after the other.
     triangle: Vec<f64>,
     /// `L^-1 normal` of the row that is being added.
-    image: Vec<f64>,
+    whitened: Vec<f64>,
     /// Its part outside the active ones.
-    outside: Vec<f64>,
+    orthogonal: Vec<f64>,
     /// The direction of a move.
     direction: Vec<f64>,
     /// Its part inside: in the basis, then in the images.
-    inside: Vec<f64>,
+    coefficients: Vec<f64>,
 }
 
-/// `sum_i a_i b_i`.
-#[inline(always)]
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y)
-}
-
-/// Cholesky factor in place of the lower triangle, row by row, its diagonal inverted; false unless
-/// positive definite.
-pub(crate) fn cholesky(matrix: &mut [f64], size: usize) -> bool {
-    for i in 0..size {
-        for j in 0..=i {
-            let (above, below) = matrix.split_at_mut(i * size);
-            let sum = if j == i {
-                below[j] - dot(&below[..j], &below[..j])
-            } else {
-                below[j] - dot(&below[..j], &above[j * size..j * size + j])
-            };
-            if j < i {
-                below[j] = sum * above[j * size + j];
-            } else if sum > 0.0 {
-                below[j] = 1.0 / sum.sqrt();
-            } else {
-                return false;
-            }
-        }
-    }
-    true
-}
-
-/// Solves `L x = x` in place.
-pub(crate) fn forward(factor: &[f64], size: usize, x: &mut [f64]) {
-    for i in 0..size {
-        let row = &factor[i * size..i * size + i];
-        x[i] = (x[i] - dot(row, &x[..i])) * factor[i * size + i];
-    }
-}
-
-/// Solves `L^T x = x` in place.
-pub(crate) fn backward(factor: &[f64], size: usize, x: &mut [f64]) {
-    for i in (0..size).rev() {
-        x[i] *= factor[i * size + i];
-        let value = x[i];
-        for (entry, l) in x[..i].iter_mut().zip(&factor[i * size..i * size + i]) {
-            *entry -= l * value;
-        }
-    }
-}
-
-impl Quadratic {
+impl QuadraticProgram {
     /// Factors a symmetric Hessian, of which the lower triangle is read (row by row); false unless it
     /// is positive definite.
     pub fn factor(&mut self, hessian: &[f64], size: usize) -> bool {
@@ -179,7 +168,7 @@ impl Quadratic {
         self.active.clear();
         self.multipliers.clear();
         self.implied.clear();
-        self.images.clear();
+        self.whitened_rows.clear();
         self.basis.clear();
         self.triangle.clear();
         self.step.clear();
@@ -188,7 +177,7 @@ impl Quadratic {
         backward(&self.factor, self.size, &mut self.step);
     }
 
-    /// The same under `rows`.
+    /// Minimises `p . H p / 2 + gradient . p` under `rows`, with the Hessian factored last.
     pub fn solve(&mut self, rows: &Rows) -> Outcome {
         self.solve_free();
         if rows.equalities > 0 && !self.meet_equations(rows) {
@@ -211,7 +200,7 @@ impl Quadratic {
                 let finite = self.step.iter().all(|p| p.is_finite());
                 return if finite { Outcome::Solved } else { Outcome::Failed };
             }
-            match self.add(rows, row, worst) {
+            match self.activate(rows, row, worst) {
                 Outcome::Solved => {}
                 other => return other,
             }
@@ -220,7 +209,7 @@ impl Quadratic {
     }
 
     /// Largest component of `gradient + sum_k multiplier_k normal_k` after a solve under `rows`: 0 where
-    /// the gradient is held by the constraints.
+    /// the constraints balance the gradient.
     #[must_use]
     pub fn lagrangian_gradient(&self, rows: &Rows) -> f64 {
         (0..self.size).fold(0.0, |most, i| {
@@ -239,27 +228,27 @@ impl Quadratic {
     fn meet_equations(&mut self, rows: &Rows) -> bool {
         let size = self.size;
         for row in 0..rows.equalities {
-            self.image.clear();
-            self.image.extend_from_slice(rows.normal(size, row));
-            forward(&self.factor, size, &mut self.image);
-            self.split();
-            let whole = dot(&self.image, &self.image);
-            if dot(&self.outside, &self.outside) > DEPENDENT * whole {
+            self.whitened.clear();
+            self.whitened.extend_from_slice(rows.normal(size, row));
+            forward(&self.factor, size, &mut self.whitened);
+            self.project();
+            let squared_norm = dot(&self.whitened, &self.whitened);
+            if dot(&self.orthogonal, &self.orthogonal) > DEPENDENT * squared_norm {
                 self.active.push(row);
-                self.images.extend_from_slice(&self.image);
+                self.whitened_rows.extend_from_slice(&self.whitened);
                 self.extend_basis();
             }
         }
-        self.inside.clear();
+        self.coefficients.clear();
         for (k, &row) in self.active.iter().enumerate() {
             let column = &self.triangle[k * (k + 1) / 2..(k + 1) * (k + 2) / 2];
             let off = rows.offsets[row] - dot(rows.normal(size, row), &self.step);
-            let rest = off - dot(&column[..k], &self.inside);
-            self.inside.push(rest / column[k]);
+            let rest = off - dot(&column[..k], &self.coefficients);
+            self.coefficients.push(rest / column[k]);
         }
         self.direction.clear();
         self.direction.resize(size, 0.0);
-        for (along, basis) in self.inside.iter().zip(self.basis.chunks_exact(size)) {
+        for (along, basis) in self.coefficients.iter().zip(self.basis.chunks_exact(size)) {
             for (entry, b) in self.direction.iter_mut().zip(basis) {
                 *entry += along * b;
             }
@@ -267,7 +256,7 @@ impl Quadratic {
         backward(&self.factor, size, &mut self.direction);
         self.step.iter_mut().zip(&self.direction).for_each(|(p, d)| *p += d);
         self.solve_triangle();
-        self.multipliers.extend(self.inside.iter().map(|along| -along));
+        self.multipliers.extend(self.coefficients.iter().map(|along| -along));
         // Those that depend on others hold by themselves, or never.
         (0..rows.equalities).all(|row| {
             let off = dot(rows.normal(size, row), &self.step) - rows.offsets[row];
@@ -275,22 +264,25 @@ impl Quadratic {
         })
     }
 
-    /// Moves to the minimum with a violated row active as well, dropping those that let go.
-    fn add(&mut self, rows: &Rows, row: usize, violation: f64) -> Outcome {
+    /// Moves to the minimum with a violated row active as well, dropping rows whose multiplier vanishes.
+    fn activate(&mut self, rows: &Rows, row: usize, violation: f64) -> Outcome {
         let size = self.size;
         let mut violation = violation;
         let mut multiplier = 0.0;
-        self.image.clear();
-        self.image.extend_from_slice(rows.normal(size, row));
-        forward(&self.factor, size, &mut self.image);
-        let whole = dot(&self.image, &self.image);
+        self.whitened.clear();
+        self.whitened.extend_from_slice(rows.normal(size, row));
+        forward(&self.factor, size, &mut self.whitened);
+        let squared_norm = dot(&self.whitened, &self.whitened);
+        // Each pass drops an active row that lets go, until the new one is active too.
         loop {
-            self.split();
-            let outside = dot(&self.outside, &self.outside);
+            // Primal direction z and dual direction r of the paper: L⁻¹n outside and inside the active rows.
+            self.project();
+            let orthogonal = dot(&self.orthogonal, &self.orthogonal);
             self.solve_triangle();
-            let (length, leaving) = self.first_to_leave(rows.equalities);
-            let full = outside > PARALLEL * whole;
-            if !full && leaving == usize::MAX {
+            let (length, blocking) = self.blocking_constraint(rows.equalities);
+            // A row that depends on the active ones contradicts them or holds with them.
+            let independent = orthogonal > PARALLEL * squared_norm;
+            if !independent && blocking == usize::MAX {
                 if violation > CONTRADICTION || multiplier > 0.0 {
                     return Outcome::Infeasible;
                 }
@@ -298,67 +290,69 @@ impl Quadratic {
                 return Outcome::Solved;
             }
             // |outside|^2 is the curvature along the move.
-            let whole_move = if full { violation / outside } else { f64::INFINITY };
-            let step = whole_move.min(length);
-            if full {
-                self.direction.clone_from(&self.outside);
+            let full_step = if independent { violation / orthogonal } else { f64::INFINITY };
+            // Step length: full (t2), or partial up to the blocking multiplier (t1).
+            let step = full_step.min(length);
+            if independent {
+                self.direction.clone_from(&self.orthogonal);
                 backward(&self.factor, size, &mut self.direction);
                 for (p, d) in self.step.iter_mut().zip(&self.direction) {
                     *p -= step * d;
                 }
-                violation -= step * outside;
+                violation -= step * orthogonal;
             }
-            for (held, along) in self.multipliers.iter_mut().zip(&self.inside) {
+            for (held, along) in self.multipliers.iter_mut().zip(&self.coefficients) {
                 *held -= step * along;
             }
             multiplier += step;
-            if whole_move <= length {
+            // A full step makes the row active; a partial one drops the blocking row.
+            if full_step <= length {
                 self.active.push(row);
                 self.multipliers.push(multiplier);
-                self.images.extend_from_slice(&self.image);
+                self.whitened_rows.extend_from_slice(&self.whitened);
                 // Coefficients have overwritten the components.
-                self.split();
+                self.project();
                 self.extend_basis();
                 return Outcome::Solved;
             }
-            self.active.remove(leaving);
-            self.multipliers.remove(leaving);
-            self.images.drain(leaving * size..(leaving + 1) * size);
+            self.active.remove(blocking);
+            self.multipliers.remove(blocking);
+            self.whitened_rows.drain(blocking * size..(blocking + 1) * size);
             self.rebuild_basis();
         }
     }
 
-    /// How far a move can go until the multiplier of an active inequality vanishes, and which.
-    fn first_to_leave(&self, equalities: usize) -> (f64, usize) {
-        let (mut length, mut leaving) = (f64::INFINITY, usize::MAX);
+    /// Longest step (t1 of the paper) until the multiplier of an active inequality vanishes, and its place.
+    fn blocking_constraint(&self, equalities: usize) -> (f64, usize) {
+        let (mut length, mut blocking) = (f64::INFINITY, usize::MAX);
         for (k, &row) in self.active.iter().enumerate() {
-            if row >= equalities && self.inside[k] > 0.0 {
-                let ratio = self.multipliers[k] / self.inside[k];
+            if row >= equalities && self.coefficients[k] > 0.0 {
+                let ratio = self.multipliers[k] / self.coefficients[k];
                 if ratio < length {
-                    (length, leaving) = (ratio, k);
+                    (length, blocking) = (ratio, k);
                 }
             }
         }
-        (length, leaving)
+        (length, blocking)
     }
 
-    /// Splits `image` into its components in the basis, `inside`, and the rest, `outside`.
-    fn split(&mut self) {
+    /// Splits `whitened` into its components in the basis, `coefficients`, and the rest, `orthogonal`.
+    fn project(&mut self) {
         let size = self.size;
-        self.inside.clear();
-        self.outside.clone_from(&self.image);
+        self.coefficients.clear();
+        self.orthogonal.clone_from(&self.whitened);
         for direction in self.basis.chunks_exact(size) {
-            let along = dot(direction, &self.outside);
-            self.inside.push(along);
-            for (rest, d) in self.outside.iter_mut().zip(direction) {
+            let along = dot(direction, &self.orthogonal);
+            self.coefficients.push(along);
+            for (rest, d) in self.orthogonal.iter_mut().zip(direction) {
                 *rest -= along * d;
             }
         }
         // What is small is mostly rounding: once more.
         for (k, direction) in self.basis.chunks_exact(size).enumerate() {
-            let along = dot(direction, &self.outside);
-            self.inside[k] += along;
-            for (rest, d) in self.outside.iter_mut().zip(direction) {
+            let along = dot(direction, &self.orthogonal);
+            self.coefficients[k] += along;
+            for (rest, d) in self.orthogonal.iter_mut().zip(direction) {
                 *rest -= along * d;
             }
         }
@@ -366,38 +360,38 @@ impl Quadratic {
 
     /// From components in the basis to coefficients of the active images.
     fn solve_triangle(&mut self) {
-        let count = self.inside.len();
+        let count = self.coefficients.len();
         for k in (0..count).rev() {
             let column = &self.triangle[k * (k + 1) / 2..(k + 1) * (k + 2) / 2];
-            self.inside[k] /= column[k];
-            let value = self.inside[k];
-            for (entry, r) in self.inside[..k].iter_mut().zip(column) {
+            self.coefficients[k] /= column[k];
+            let value = self.coefficients[k];
+            for (entry, r) in self.coefficients[..k].iter_mut().zip(column) {
                 *entry -= value * r;
             }
         }
     }
 
-    /// Adds `image`, split last, which has a part outside the basis.
+    /// Adds `whitened`, split last, which has a part outside the basis.
     fn extend_basis(&mut self) {
-        let norm = dot(&self.outside, &self.outside).sqrt();
-        self.triangle.extend_from_slice(&self.inside);
+        let norm = dot(&self.orthogonal, &self.orthogonal).sqrt();
+        self.triangle.extend_from_slice(&self.coefficients);
         self.triangle.push(norm);
-        self.basis.extend(self.outside.iter().map(|y| y / norm));
+        self.basis.extend(self.orthogonal.iter().map(|y| y / norm));
     }
 
     fn rebuild_basis(&mut self) {
         let size = self.size;
-        let image = std::mem::take(&mut self.image);
-        let images = std::mem::take(&mut self.images);
+        let whitened = std::mem::take(&mut self.whitened);
+        let whitened_rows = std::mem::take(&mut self.whitened_rows);
         self.basis.clear();
         self.triangle.clear();
-        for active in images.chunks_exact(size) {
-            self.image.clear();
-            self.image.extend_from_slice(active);
-            self.split();
+        for active in whitened_rows.chunks_exact(size) {
+            self.whitened.clear();
+            self.whitened.extend_from_slice(active);
+            self.project();
             self.extend_basis();
         }
-        self.images = images;
-        self.image = image;
+        self.whitened_rows = whitened_rows;
+        self.whitened = whitened;
     }
 }

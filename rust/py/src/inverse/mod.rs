@@ -12,7 +12,7 @@ use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
 use tdcr::inverse::{
-    Answer, ConstantCurvatureInverse, Inverter, Method, Placed, RodInverse, Target,
+    Answer, ConstantCurvatureInverse, Inverter, Method, PositionsAnswer, RodInverse, Target,
 };
 use tdcr::model::State;
 use tdcr::rod::contact::Scene;
@@ -274,10 +274,10 @@ pub(crate) fn _inverse_places(
         around.stopped_by(&control.stop);
         let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
         let start = start.map(begin).transpose()?;
-        inverse.solve_places(&places, start.as_ref(), Some(&control.stop))
+        inverse.solve_positions(&places, start.as_ref(), Some(&control.stop))
     })?;
     checked(py, Mutex::new(inverse.take_fault()))?;
-    let Placed { answer, displacements, tensions, message, state } =
+    let PositionsAnswer { answer, displacements, tensions, message, state } =
         found.map_err(|e| invalid(&e))?;
     let found = ((displacements, tensions, answer, message), state);
     with_shape(py, robot, &plans, found, Choice::new(model, settings)?, around)
@@ -341,7 +341,7 @@ pub(crate) fn _inverse_solutions(
     let target = one_target(target)?;
     inverse.check_target(&target).map_err(|e| invalid(&e))?;
     let solutions = interruptible::run(py, None, |control| {
-        inverse.solutions_in(&target, &mut inverse.workspace().stopped_by(&control.stop))
+        inverse.solutions_in(&target, &mut inverse.scratch().stopped_by(&control.stop))
     })?;
     let rows = solutions.iter().map(|solution| {
         let unknown = vec![f64::NAN; solution.displacements.len()];

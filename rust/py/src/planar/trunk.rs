@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use tdcr::InvalidInput;
 use tdcr::batch::pool;
-use tdcr::planar::{AngleFunction, Cables, Trunk, TwoSections, solve_many};
+use tdcr::planar::{AngleFunction, Cables, Trunk, TwoSections, solution_rows};
 
 use crate::convert::arguments::{number, optional, text, whole};
 use crate::convert::arrays::{float_array, frozen, invalid, values, wrong_shape};
@@ -248,7 +248,7 @@ pub(crate) fn _two_section_batch(
     }
     let pool = pool(optional("threads", threads, whole)?).map_err(|e| invalid(&e))?;
     let many =
-        interruptible::run(py, progress, |control| solve_many(&two, &targets, &pool, control))?;
+        interruptible::run(py, progress, |control| solution_rows(&two, &targets, &pool, control))?;
     // Stopped only by an interrupt, which run has raised.
     let many = many.unwrap_or_default();
     let counts: Vec<u64> = many.counts.iter().map(|count| *count as u64).collect();

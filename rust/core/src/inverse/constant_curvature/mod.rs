@@ -7,11 +7,11 @@ use std::sync::{self, atomic::AtomicBool};
 
 use nalgebra::Vector2;
 
-use super::arc_problem::Chain;
+use super::arc_problem::ArcProblem;
 use super::batch::Inverter;
-use super::bounds::{Bounds, Reach};
-use super::multistart::{Effort, Found, Freedom, Search};
-use super::outcome::{Answer, tell};
+use super::bounds::{ArcSpace, Bounds};
+use super::multistart::{Freedom, Multistart, SearchOptions, SearchOutcome};
+use super::outcome::{Answer, message_of};
 use super::{InverseSettings, Method, Target};
 use crate::constant_curvature::{self, Arc, ConstantCurvature, ConstantCurvatureSettings, Plan};
 use crate::error::InvalidInput;
@@ -22,10 +22,30 @@ use crate::status::Status;
 pub(super) use starts::arc_to;
 
 /// Buffers of a solve and the arcs it found.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
+/// # use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// # let (bounds, settings) = (Bounds::default(), InverseSettings::default());
+/// # let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
+/// let mut scratch = inverse.scratch();
+/// inverse.solve(&Target::Position(Vector3::new(0.05, 0.0, 0.18)), None, &mut scratch);
+/// assert_eq!(inverse.arcs(&scratch).len(), 1);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scratch<'a> {
-    chain: Chain<'a>,
-    search: Search<'a>,
+    problem: ArcProblem<'a>,
+    search: Multistart<'a>,
 }
 
 impl<'a> Scratch<'a> {
@@ -38,12 +58,36 @@ impl<'a> Scratch<'a> {
 }
 
 /// A robot prepared for inverse solves with the constant-curvature model.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::constant_curvature::{Arc, ConstantCurvatureSettings, Plan};
+/// use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// let (bounds, settings) = (Bounds::default(), InverseSettings::default());
+/// let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
+/// let tip = Arc::new(5.0, 1.0, 0.2).frame(1.0).translation;
+/// let mut scratch = inverse.scratch();
+/// let answer = inverse.solve(&Target::Position(tip), None, &mut scratch);
+/// assert_eq!(answer.status, tdcr::Status::Converged);
+/// let mut displacements = [0.0; 3];
+/// inverse.write_displacements(&scratch, &mut displacements);
+/// assert!((inverse.arcs(&scratch)[0].kappa() - 5.0).abs() < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct ConstantCurvatureInverse<'a> {
     robot: &'a Robot,
     plan: Cow<'a, Plan>,
     settings: InverseSettings,
-    reach: Reach,
+    space: ArcSpace,
 }
 
 impl<'a> ConstantCurvatureInverse<'a> {
@@ -58,12 +102,12 @@ impl<'a> ConstantCurvatureInverse<'a> {
         settings: InverseSettings,
     ) -> Result<Self, InvalidInput> {
         settings.validate()?;
-        let reach = Reach::new(plan, bounds, robot.tendon_names())?;
-        Ok(Self { robot, plan: Cow::Borrowed(plan), settings, reach })
+        let space = ArcSpace::new(plan, bounds, robot.tendon_names())?;
+        Ok(Self { robot, plan: Cow::Borrowed(plan), settings, space })
     }
 
     /// For first guesses of another model, without bounds: none where the routing is none for arcs.
-    pub(super) fn guessing(robot: &'a Robot, settings: &InverseSettings) -> Option<Self> {
+    pub(super) fn for_guesses(robot: &'a Robot, settings: &InverseSettings) -> Option<Self> {
         let plan = Plan::new(robot, ConstantCurvatureSettings::default()).ok()?;
         let settings = InverseSettings {
             position_tolerance: settings.position_tolerance.max(GUESS),
@@ -72,23 +116,23 @@ impl<'a> ConstantCurvatureInverse<'a> {
             least_energy: false,
             ..*settings
         };
-        let reach = Reach::new(&plan, &Bounds::default(), robot.tendon_names()).ok()?;
-        Some(Self { robot, plan: Cow::Owned(plan), settings, reach })
+        let space = ArcSpace::new(&plan, &Bounds::default(), robot.tendon_names()).ok()?;
+        Some(Self { robot, plan: Cow::Owned(plan), settings, space })
     }
 
     /// The bending vector of every subsegment where the k-th few starts lead, met or not.
-    pub(super) fn guess(
+    pub(super) fn guess_bends(
         &self,
         target: &Target,
         k: usize,
         work: &mut Scratch<'_>,
         bends: &mut Vec<Vector2<f64>>,
     ) {
-        work.chain.aim.at(*target);
-        let effort = self.effort(&work.chain, FEW);
-        let effort = Effort { first: FEW * k, fall_back: false, nearest: false, ..effort };
-        work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| {
-            self.begin(target, k, point);
+        work.problem.pose_residual.set_target(*target);
+        let options = self.options(&work.problem, FEW);
+        let options = SearchOptions { first: FEW * k, fall_back: false, nearest: false, ..options };
+        work.search.run(&mut work.problem, &self.space.search, options, |k, point| {
+            self.start_point(target, k, point);
         });
         let lengths = self.robot.backbone().lengths();
         bends.clear();
@@ -112,17 +156,17 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// Buffers for this inverse.
     #[must_use]
-    pub fn workspace(&self) -> Scratch<'_> {
+    pub fn scratch(&self) -> Scratch<'_> {
         Scratch {
-            chain: Chain::new(self.robot, &self.plan, &self.settings),
-            search: Search::default(),
+            problem: ArcProblem::new(self.robot, &self.plan, &self.settings),
+            search: Multistart::default(),
         }
     }
 
-    /// Seeks arcs that bring the tool to `target`; first from `start`, if given.
+    /// Solves for arcs that bring the tool to `target`; first from `start`, if given.
     pub fn solve(&self, target: &Target, start: Option<&[Arc]>, work: &mut Scratch<'_>) -> Answer {
-        work.chain.aim.at(*target);
-        let effort = self.effort(&work.chain, self.settings.starts);
+        work.problem.pose_residual.set_target(*target);
+        let options = self.options(&work.problem, self.settings.starts);
         let usable = |arcs: &&[Arc]| {
             let sound = |arc: &Arc| arc.bend.amax() < FAR && arc.length.is_finite();
             arcs.len() == self.plan.segment_count() && arcs.iter().all(sound)
@@ -130,50 +174,56 @@ impl<'a> ConstantCurvatureInverse<'a> {
         let start = start.filter(usable);
         let given = usize::from(start.is_some());
         let found =
-            work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| match start {
-                Some(arcs) if k == 0 => self.unknowns(arcs, point),
-                _ => self.begin(target, k - given, point),
-            });
-        Self::answer(found, &work.chain)
+            work.search.run(
+                &mut work.problem,
+                &self.space.search,
+                options,
+                |k, point| match start {
+                    Some(arcs) if k == 0 => self.unknowns(arcs, point),
+                    _ => self.start_point(target, k - given, point),
+                },
+            );
+        Self::answer(found, &work.problem)
     }
 
-    /// Seeks again from where the last solve in `work` ended, as along a path; from other starts only when
+    /// Solves again from the point where the last solve in `work` ended, as along a path; from other starts only when
     /// that fails.
     pub fn follow(&self, target: &Target, work: &mut Scratch<'_>) -> Answer {
-        if work.search.point.len() != self.reach.space.region.size() {
+        if work.search.point.len() != self.space.search.region.size() {
             return self.solve(target, None, work);
         }
-        work.chain.aim.at(*target);
-        let effort = self.effort(&work.chain, self.settings.starts);
-        let found = work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| {
+        work.problem.pose_residual.set_target(*target);
+        let options = self.options(&work.problem, self.settings.starts);
+        let found = work.search.run(&mut work.problem, &self.space.search, options, |k, point| {
             if k > 0 {
-                self.begin(target, k - 1, point);
+                self.start_point(target, k - 1, point);
             }
         });
-        Self::answer(found, &work.chain)
+        Self::answer(found, &work.problem)
     }
 
     /// Every distinct answer that the starts lead to, least bending energy first: its arcs, its energy over
     /// that of the others, and how many starts led there.
     #[must_use]
     pub fn solutions(&self, target: &Target) -> Vec<Solution> {
-        self.solutions_in(target, &mut self.workspace())
+        self.solutions_in(target, &mut self.scratch())
     }
 
-    /// The same in given buffers.
+    /// Distinct answers as in [`Self::solutions`], in buffers of the caller.
     #[must_use]
     pub fn solutions_in(&self, target: &Target, work: &mut Scratch<'_>) -> Vec<Solution> {
-        work.chain.aim.at(*target);
+        work.problem.pose_residual.set_target(*target);
         let mut distinct: Vec<(Vec<f64>, Solution)> = Vec::new();
-        let mut slope = vec![0.0; self.reach.space.region.size()];
+        let mut slope = vec![0.0; self.space.search.region.size()];
         for k in 0..self.settings.starts {
-            if work.search.stopped() {
+            if work.search.is_stopped() {
                 break;
             }
-            let effort = Effort { first: k, ..self.effort(&work.chain, 1) };
-            let found = work.search.run(&mut work.chain, &self.reach.space, effort, |k, point| {
-                self.begin(target, k, point);
-            });
+            let options = SearchOptions { first: k, ..self.options(&work.problem, 1) };
+            let found =
+                work.search.run(&mut work.problem, &self.space.search, options, |k, point| {
+                    self.start_point(target, k, point);
+                });
             if found.status != Status::Converged {
                 continue;
             }
@@ -184,8 +234,8 @@ impl<'a> ConstantCurvatureInverse<'a> {
                 known.hits += 1;
                 continue;
             }
-            let energy = work.chain.energy(point, &mut slope);
-            let answer = Self::answer(found, &work.chain);
+            let energy = work.problem.energy(point, &mut slope);
+            let answer = Self::answer(found, &work.problem);
             let mut displacements = vec![0.0; self.robot.tendons().len()];
             self.write_displacements(work, &mut displacements);
             let arcs = self.arcs(work);
@@ -196,12 +246,14 @@ impl<'a> ConstantCurvatureInverse<'a> {
         distinct.into_iter().map(|(_, solution)| solution).collect()
     }
 
-    fn effort(&self, chain: &Chain<'_>, starts: usize) -> Effort<'_> {
-        Effort {
+    fn options(&self, problem: &ArcProblem<'_>, starts: usize) -> SearchOptions<'_> {
+        SearchOptions {
             first: 0,
             starts,
             max_iterations: self.settings.max_iterations,
-            freedom: if self.settings.least_energy && self.reach.freedoms > chain.aim.rows() {
+            freedom: if self.settings.least_energy
+                && self.space.freedoms > problem.pose_residual.row_count()
+            {
                 Freedom::Smooth
             } else {
                 Freedom::None
@@ -214,9 +266,9 @@ impl<'a> ConstantCurvatureInverse<'a> {
         }
     }
 
-    fn answer(found: Found, chain: &Chain<'_>) -> Answer {
-        let (distance, angle) = chain.aim.misses();
-        let Found { status, iterations, starts } = found;
+    fn answer(found: SearchOutcome, problem: &ArcProblem<'_>) -> Answer {
+        let (distance, angle) = problem.pose_residual.errors();
+        let SearchOutcome { status, iterations, starts } = found;
         Answer { status, distance, angle, iterations, starts }
     }
 
@@ -234,14 +286,14 @@ impl<'a> ConstantCurvatureInverse<'a> {
 
     /// The displacements that give the robot the arcs that the last solve in `work` found \[m\].
     pub fn write_displacements(&self, work: &Scratch<'_>, place: &mut [f64]) {
-        self.reach.write_displacements(&self.plan, &work.search.point, place);
+        self.space.write_displacements(&self.plan, &work.search.point, place);
     }
 
-    /// What stood in the way of the last solve in `work`, in a sentence; empty when it converged.
+    /// Reason why the last solve in `work` did not converge, in a sentence; empty when it did.
     #[must_use]
     pub fn message(&self, answer: &Answer, work: &Scratch<'_>) -> String {
-        let held = self.reach.holding(&work.search.point);
-        tell(answer, &self.settings, &held, "bending energy")
+        let held = self.space.active_bounds(&work.search.point);
+        message_of(answer, &self.settings, &held, "bending energy")
     }
 
     fn unknowns(&self, arcs: &[Arc], point: &mut Vec<f64>) {
@@ -255,13 +307,13 @@ impl<'a> ConstantCurvatureInverse<'a> {
     }
 }
 
-/// What a first guess may miss \[m, rad\], and its starts.
+/// Tolerance of a first guess \[m, rad\], and its starts.
 const GUESS: f64 = 1e-6;
 const FEW: usize = 8;
 
 impl Inverter for ConstantCurvatureInverse<'_> {
     type Start = Vec<Arc>;
-    type Work<'w>
+    type Scratch<'w>
         = Scratch<'w>
     where
         Self: 'w;
@@ -286,7 +338,7 @@ impl Inverter for ConstantCurvatureInverse<'_> {
     }
 
     fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Scratch<'w> {
-        let work = self.workspace();
+        let work = self.scratch();
         match stop {
             Some(stop) => work.stopped_by(stop),
             None => work,
@@ -319,6 +371,27 @@ const FAR: f64 = 1e3;
 const DISTINCT: f64 = 1e-6;
 
 /// One of several answers.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
+/// # use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
+/// # let (bounds, settings) = (Bounds::default(), InverseSettings::default());
+/// # let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
+/// let tip = tdcr::constant_curvature::Arc::new(5.0, 1.0, 0.2).frame(1.0).translation;
+/// let solutions = inverse.solutions(&Target::Position(tip));
+/// assert!(solutions.iter().any(|solution| (solution.arcs[0].kappa() - 5.0).abs() < 1e-6));
+/// assert!(solutions.is_sorted_by(|a, b| a.energy <= b.energy));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
     /// Its arcs, base first.
@@ -327,8 +400,8 @@ pub struct Solution {
     pub displacements: Vec<f64>,
     /// Its bending energy, in a unit common to the answers.
     pub energy: f64,
-    /// How many starts led to it.
+    /// Number of starts that led to it.
     pub hits: usize,
-    /// How it ended.
+    /// Outcome of its search.
     pub answer: Answer,
 }

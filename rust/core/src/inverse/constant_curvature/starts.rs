@@ -1,4 +1,4 @@
-//! Where searches begin.
+//! Starting points of the search over arcs.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,12 +8,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::ConstantCurvatureInverse;
 use crate::inverse::Target;
-use crate::inverse::bounds::Draw;
+use crate::inverse::bounds::SegmentRange;
 
 impl ConstantCurvatureInverse<'_> {
     /// The k-th start: one arc to the target, which is the answer for a single segment; nearly straight;
     /// then random ones, each from its own stream.
-    pub(super) fn begin(&self, target: &Target, k: usize, point: &mut Vec<f64>) {
+    pub(super) fn start_point(&self, target: &Target, k: usize, point: &mut Vec<f64>) {
         point.clear();
         match k {
             0 => self.single_arc(target, point),
@@ -36,7 +36,7 @@ impl ConstantCurvatureInverse<'_> {
             }
         };
         let angle = bend.norm();
-        for (segment, draw) in self.plan.segments().zip(&self.reach.draws) {
+        for (segment, draw) in self.plan.segments().zip(&self.space.draws) {
             let share = segment.rest_length / rest;
             let share = if angle * share > draw.widest { draw.widest / angle } else { share };
             point.extend_from_slice((bend * share).as_slice());
@@ -47,7 +47,7 @@ impl ConstantCurvatureInverse<'_> {
     }
 
     fn nearly_straight(&self, point: &mut Vec<f64>) {
-        for (i, draw) in self.reach.draws.iter().enumerate() {
+        for (i, draw) in self.space.draws.iter().enumerate() {
             let (sin, cos) = (2.4 * i as f64).sin_cos();
             point.extend([0.02 * cos, 0.02 * sin]);
             if self.plan.width() == 3 {
@@ -59,8 +59,8 @@ impl ConstantCurvatureInverse<'_> {
     fn random(&self, k: usize, point: &mut Vec<f64>) {
         let mut draws = ChaCha8Rng::seed_from_u64(self.settings.seed);
         draws.set_stream(k as u64);
-        for &Draw { widest, shortest, longest } in &self.reach.draws {
-            // Segments seldom turn by more than half a turn: every other start looks no further.
+        for &SegmentRange { widest, shortest, longest } in &self.space.draws {
+            // Segments seldom turn by more than half a turn: every other start stays within it.
             let widest = if k.is_multiple_of(2) { widest.min(PI) } else { widest };
             let angle = widest * draws.random::<f64>();
             let (sin, cos) = (TAU * draws.random::<f64>()).sin_cos();

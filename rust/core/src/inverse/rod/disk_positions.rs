@@ -1,17 +1,17 @@
-//! Displacements that bring the disks to wanted places.
+//! Displacements that bring the disks to given positions.
 
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::{RodInverse, ended};
+use super::RodInverse;
 use crate::error::InvalidInput;
 use crate::inverse::Target;
 use crate::inverse::batch::near_enough;
-use crate::inverse::multistart::{Effort, Freedom, Search};
+use crate::inverse::multistart::{Freedom, Multistart, SearchOptions};
 use crate::inverse::outcome::Answer;
-use crate::inverse::position_goal::PlacesGoal;
-use crate::inverse::tension_problem::Pull;
+use crate::inverse::position_goal::PositionGoal;
+use crate::inverse::tension_problem::{TensionProblem, evaluate_answer};
 use crate::lie::{Pose, so3};
 use crate::model::State;
 use crate::status::Status;
@@ -23,34 +23,54 @@ const BEND: f64 = 1.0;
 /// Most tendons.
 const TENDONS: usize = 63;
 
-/// What was found for wanted places.
+/// Answer of an inverse for disk positions.
+///
+/// ```
+/// use tdcr::inverse::{Bounds, InverseSettings, RodInverse};
+/// use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let inverse = RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default())?;
+/// // The disks as they are at rest.
+/// let positions: Vec<_> =
+///     robot.rest_frames().iter().skip(1).map(|frame| Some(frame.translation)).collect();
+/// let found = inverse.solve_positions(&positions, None, None)?;
+/// assert!(found.message.is_empty() && found.displacements.iter().all(|d| d.abs() < 1e-8));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
-pub struct Placed {
-    /// How it ended; its distance is the largest of a disk.
+pub struct PositionsAnswer {
+    /// Outcome; its distance is the largest of a disk.
     pub answer: Answer,
     /// Tendon displacements \[m\].
     pub displacements: Vec<f64>,
     /// Tensions, in the unit of the results.
     pub tensions: Vec<f64>,
-    /// What stood in the way; empty when every place is met.
+    /// Reason why it did not converge; empty when every position is met.
     pub message: String,
-    /// The shape, where displacements do not say which it is.
+    /// Shape, where displacements do not determine it.
     pub state: Option<State>,
 }
 
 impl RodInverse<'_> {
-    /// Seeks what brings disks nearest to their places \[m\], world frame, one per disk from the first, or none: least
-    /// sum of squared distances. First from a shape with its tensions, if given. Freedom that the places leave is not spent.
+    /// Brings disks as near as possible to positions \[m\], world frame, one per disk from the first, or none: least
+    /// sum of squared distances. First from a shape with its tensions, if given. Remaining freedom is not spent.
     ///
     /// # Errors
-    /// `InvalidInput` for another number of places than disks, none at all, one that is not finite or further away than
+    /// `InvalidInput` for another number of positions than disks, none at all, one that is not finite or beyond
     /// a million lengths, and more than 63 tendons.
-    pub fn solve_places(
+    pub fn solve_positions(
         &self,
         places: &[Option<Vector3<f64>>],
         start: Option<&State>,
         stop: Option<&AtomicBool>,
-    ) -> Result<Placed, InvalidInput> {
+    ) -> Result<PositionsAnswer, InvalidInput> {
         let disks = self.robot.backbone().subsegments();
         if places.len() != disks {
             let expected = format!("{disks} places, one per disk from the first");
@@ -66,10 +86,10 @@ impl RodInverse<'_> {
             near_enough("positions", self.robot, place)?;
         }
         match self.robot.tendons().len() {
-            ..=7 => Ok(self.reach::<8>(places, start, stop)),
-            8..=15 => Ok(self.reach::<16>(places, start, stop)),
-            16..=31 => Ok(self.reach::<32>(places, start, stop)),
-            32..=TENDONS => Ok(self.reach::<64>(places, start, stop)),
+            ..=7 => Ok(self.solve_for::<8>(places, start, stop)),
+            8..=15 => Ok(self.solve_for::<16>(places, start, stop)),
+            16..=31 => Ok(self.solve_for::<32>(places, start, stop)),
+            32..=TENDONS => Ok(self.solve_for::<64>(places, start, stop)),
             more => {
                 let expected = format!("a robot with at most {TENDONS} tendons");
                 Err(InvalidInput::new("robot", expected, more))
@@ -77,76 +97,82 @@ impl RodInverse<'_> {
         }
     }
 
-    fn reach<const R: usize>(
+    fn solve_for<const R: usize>(
         &self,
         places: &[Option<Vector3<f64>>],
         start: Option<&State>,
         stop: Option<&AtomicBool>,
-    ) -> Placed {
+    ) -> PositionsAnswer {
         let world = self.robot.base().inverse();
         let local: Vec<_> = places.iter().map(|p| p.map(|p| world.transform(&p))).collect();
         let known = local.iter().enumerate().filter_map(|(disk, place)| Some((disk, (*place)?)));
         let length = self.robot.backbone().total_length();
-        let goal = PlacesGoal::new(known.collect(), length, self.settings.position_tolerance);
+        let goal = PositionGoal::new(known.collect(), length, self.settings.position_tolerance);
         let lengths = self.rest.rest_lengths();
-        let mut pull = Pull::new(self.balance(stop), goal, lengths, &self.units, &self.ranges);
-        let mut search = Search::<R> { stop, ..Search::default() };
-        pull.rod.rest();
-        let given = start.is_some_and(|state| pull.rod.begin(state));
-        let first: Vec<f64> = if given { self.unknowns(pull.rod.tensions()) } else { Vec::new() };
+        let mut problem =
+            TensionProblem::new(self.equilibrium(stop), goal, lengths, &self.units, &self.ranges);
+        let mut search = Multistart::<R> { stop, ..Multistart::default() };
+        problem.rod.rest();
+        let given = start.is_some_and(|state| problem.rod.begin(state));
+        let first: Vec<f64> =
+            if given { self.unknowns(problem.rod.tensions()) } else { Vec::new() };
         let before = usize::from(given);
-        let begin = |k: usize, point: &mut Vec<f64>| match k.checked_sub(before) {
+        let start_point = |k: usize, point: &mut Vec<f64>| match k.checked_sub(before) {
             None => point.clone_from(&first),
-            Some(k) => self.begin_shape(&local, k, point),
+            Some(k) => self.positions_start(&local, k, point),
         };
-        let effort = Effort { freedom: Freedom::None, fall_back: false, ..self.effort(STARTS) };
-        let effort = Effort { starts: effort.starts.min(self.settings.starts), ..effort };
-        let mut rise = self.rise(stop);
-        let found = match &mut rise {
-            Some(rise) => rise.search(&mut pull, &mut search, &self.space, effort, begin),
-            None => search.run(&mut pull, &self.space, effort, begin),
+        let options =
+            SearchOptions { freedom: Freedom::None, fall_back: false, ..self.options(STARTS) };
+        let options = SearchOptions { starts: options.starts.min(self.settings.starts), ..options };
+        let mut from_rest = self.from_rest(stop);
+        let found = match &mut from_rest {
+            Some(from_rest) => {
+                from_rest.search(&mut problem, &mut search, &self.space, options, start_point)
+            }
+            None => search.run(&mut problem, &self.space, options, start_point),
         };
-        let answer = ended(found, &mut pull, &mut search, |goal| (goal.misses().0, 0.0));
-        let (most, mean, disk) = pull.aim.misses();
-        self.note_fault(pull.rod.as_mut(), rise.as_mut());
-        let held = self.held(&search.point, &pull);
+        let answer =
+            evaluate_answer(found, &mut problem, &mut search, |goal| (goal.errors().0, 0.0));
+        let (most, mean, disk) = problem.goal.errors();
+        self.note_fault(problem.rod.as_mut(), from_rest.as_mut());
+        let active = self.active_bounds(&search.point, &problem);
         let message = match answer.status {
-            Status::Converged => rise.map_or("", |rise| rise.message()).to_owned(),
-            Status::Infeasible => self.shapeless(&answer),
+            Status::Converged => from_rest.map_or("", |from_rest| from_rest.message()).to_owned(),
+            Status::Infeasible => self.no_shape_message(&answer),
             status => {
                 let how = if status == Status::Unreachable {
                     "the nearest shape"
                 } else {
                     "stopped: the shape"
                 };
-                let held = if held.is_empty() {
-                    held.join("")
+                let active = if active.is_empty() {
+                    active.join("")
                 } else {
-                    format!("; at its bound: {}", held.join(", "))
+                    format!("; at its bound: {}", active.join(", "))
                 };
                 format!(
-                    "{how} of {} starts is {most:.2e} m off at disk {}, {mean:.2e} m root mean square{held}",
+                    "{how} of {} starts is {most:.2e} m off at disk {}, {mean:.2e} m root mean square{active}",
                     found.starts,
                     disk + 1
                 )
             }
         };
-        let mut placed = Placed {
+        let mut placed = PositionsAnswer {
             answer,
             displacements: vec![0.0; self.units.len()],
             tensions: vec![0.0; self.units.len()],
             message,
-            state: pull.rod.state(),
+            state: problem.rod.state(),
         };
-        pull.write_displacements(&mut placed.displacements);
-        self.write_tensions_of(pull.rod.as_ref(), &mut placed.tensions);
+        problem.write_displacements(&mut placed.displacements);
+        self.write_tensions_of(problem.rod.as_ref(), &mut placed.tensions);
         placed
     }
 
-    /// The k-th start: arcs along the places; as for the tool at the last of them; random ones.
-    fn begin_shape(&self, places: &[Option<Vector3<f64>>], k: usize, point: &mut Vec<f64>) {
+    /// Start k: arcs along the positions; a single arc to the last of them; random ones.
+    fn positions_start(&self, places: &[Option<Vector3<f64>>], k: usize, point: &mut Vec<f64>) {
         if k == 0 {
-            self.towards(&along(places, self.robot.backbone().lengths()), point);
+            self.tensions_for_bends(&bends_along(places, self.robot.backbone().lengths()), point);
             return;
         }
         let last = places.iter().flatten().last().copied().unwrap_or_default();
@@ -154,19 +180,19 @@ impl RodInverse<'_> {
         if k == 1 {
             let mut bends = Vec::new();
             self.single_arc(&target, &mut bends);
-            self.towards(&bends, point);
+            self.tensions_for_bends(&bends, point);
         } else {
             self.random(k, point);
         }
     }
 }
 
-/// Bends of tangent arcs towards places one after the other, in the base's frame; straight where none follows.
-fn along(places: &[Option<Vector3<f64>>], lengths: &[f64]) -> Vec<Vector2<f64>> {
+/// Bends of tangent arcs towards positions one after the other, in the base's frame; straight where none follows.
+fn bends_along(places: &[Option<Vector3<f64>>], lengths: &[f64]) -> Vec<Vector2<f64>> {
     let mut frame = Pose::identity();
     let mut bends = Vec::with_capacity(places.len());
     for (i, length) in lengths.iter().enumerate() {
-        // Towards the next place that is known, over all subsegments up to there.
+        // Towards the next known position, over all subsegments up to there.
         let next = places[i..].iter().position(Option::is_some);
         let bend = match next.and_then(|more| Some((more, places[i + more]?))) {
             None => Vector2::zeros(),

@@ -13,13 +13,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{Vector2, Vector3};
 
 use super::batch::Inverter;
-use super::bounds::{Bounds, Space};
+use super::bounds::{Bounds, SearchSpace};
 use super::constant_curvature::{self, ConstantCurvatureInverse};
-use super::multistart::{Effort, Freedom, Search};
-use super::outcome::{Answer, tell};
-use super::pose_goal::ToolGoal;
-use super::pose_residual::Aim;
-use super::tension_problem::Pull;
+use super::multistart::{Freedom, Multistart, SearchOptions};
+use super::outcome::{Answer, message_of};
+use super::pose_goal::PoseGoal;
+use super::pose_residual::PoseResidual;
+use super::tension_problem::{TensionProblem, evaluate_answer};
 use super::{InverseSettings, Method, Target};
 use crate::error::InvalidInput;
 use crate::model::{Model, State};
@@ -31,37 +31,78 @@ use crate::rod::equilibrium::{ContactRod, Equilibrium};
 use crate::rod::{self, Plan, Rod, TendonRule};
 use crate::solve::convex_region::Region;
 use crate::status::Status;
-pub use disk_positions::Placed;
-use from_rest::Rise;
-use outcome::ended;
+pub use disk_positions::PositionsAnswer;
+use from_rest::FromRest;
 
 /// Buffers of a solve and the tensions it found.
+///
+/// ```
+/// use tdcr::inverse::{Bounds, InverseSettings, Inverter, RodInverse};
+/// use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let inverse = RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default())?;
+/// // One set of buffers serves many targets.
+/// let scratch = inverse.buffers(None);
+/// # drop(scratch);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct RodScratch<'a> {
-    pub(super) pull: Pull<'a>,
-    search: Search<'a>,
+    pub(super) problem: TensionProblem<'a>,
+    search: Multistart<'a>,
     guess: Option<constant_curvature::Scratch<'a>>,
     bends: Vec<Vector2<f64>>,
-    /// Whether the last solve met its target.
+    /// True when the last solve met its target.
     met: bool,
-    /// The point and the tool's place of the row before the last, along a path.
+    /// Unknowns and tool position of the row before the last, along a path.
     before: Option<(Vec<f64>, Vector3<f64>)>,
-    /// Whether answers are what rest leads to, where there is more than one shape.
-    rise: Option<Rise<'a>>,
+    /// Test of answers by solves from rest, where there is more than one shape.
+    from_rest: Option<FromRest<'a>>,
 }
 
 /// A robot prepared for inverse solves with the rod model.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::inverse::{Bounds, InverseSettings, Inverter, RodInverse, Target};
+/// use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let inverse = RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default())?;
+/// let mut scratch = inverse.buffers(None);
+/// // The tip of an arc of 1 rad.
+/// let target = Target::Position(Vector3::new(0.091_939_5, 0.0, 0.168_294_2));
+/// let answer = inverse.solve(&target, None, &mut scratch);
+/// assert!(answer.distance < 1e-2);
+/// let mut tensions = [0.0; 3];
+/// inverse.write_tensions(&scratch, &mut tensions);
+/// assert!(tensions.iter().all(|tension| *tension >= 0.0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct RodInverse<'a> {
     robot: &'a Robot,
     settings: InverseSettings,
     /// Unknowns: scaled tensions.
-    space: Space,
+    space: SearchSpace,
     /// Tension, in the plan's unit, of a unit of every unknown.
     units: Vec<f64>,
     /// Lowest and highest displacement of every tendon \[m\].
     ranges: Vec<(f64, f64)>,
-    /// What bounds of the region hold back.
+    /// Names of the bounds of the region, for messages.
     labels: Vec<String>,
     /// The rod at rest.
     rest: FreeRod<'a>,
@@ -73,10 +114,10 @@ pub struct RodInverse<'a> {
     fault: Arc<Mutex<Option<Fault>>>,
 }
 
-/// No tension is more than what would bend the rod by two turns alone, unless bounds ask for it \[rad\]: targets just out
-/// of reach are led to infinite ones, which stretch it.
+/// Largest unknown \[rad\], two turns of the rod by one tendon alone, unless bounds ask for more: targets just out of
+/// reach drive tensions to infinity, which stretches the rod.
 const MOST: f64 = 2.0 * TAU;
-/// Swarms and random starts seek unknowns up to here \[rad\].
+/// Largest unknown of swarms and random starts \[rad\].
 const WIDEST: f64 = 4.0;
 /// A tendon without leverage at rest counts as if its holes were this share of the robot's length off the backbone.
 const LEVER: f64 = 1e-3;
@@ -111,20 +152,20 @@ impl<'a> RodInverse<'a> {
         let mut inverse = Self {
             robot,
             settings,
-            space: Space { region: Region::new(count), lower: Vec::new(), upper: Vec::new() },
+            space: SearchSpace { region: Region::new(count), lower: Vec::new(), upper: Vec::new() },
             units,
             ranges: (0..count).map(|k| bounds.displacement_of(k)).collect(),
             labels: Vec::new(),
             rest,
-            arcs: ConstantCurvatureInverse::guessing(robot, &settings),
+            arcs: ConstantCurvatureInverse::for_guesses(robot, &settings),
             loaded: None,
             fault: Arc::default(),
         };
-        inverse.bound(bounds);
+        inverse.add_tension_bounds(bounds);
         Ok(inverse)
     }
 
-    /// The same among obstacles and under loads, in a scene that was made of this robot and its plan.
+    /// Inverse among obstacles and under loads, in a scene that was made of this robot and its plan.
     ///
     /// # Errors
     /// As [`LoadedRod::new`].
@@ -133,14 +174,14 @@ impl<'a> RodInverse<'a> {
         Ok(Self { loaded: Some(loaded), ..self })
     }
 
-    /// What a function of an obstacle ended all work with, if it did.
+    /// Fault with which a function of an obstacle ended all work, if it did.
     #[must_use]
     pub fn take_fault(&self) -> Option<Fault> {
         self.fault.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Solves unless a function of an obstacle failed before, and keeps its fault if it does now.
-    fn watched(
+    /// Solves unless a function of an obstacle failed before, and keeps its fault if it fails now.
+    fn solve_without_fault(
         &self,
         work: &mut RodScratch<'_>,
         solve: impl FnOnce(&mut RodScratch<'_>) -> Answer,
@@ -150,28 +191,28 @@ impl<'a> RodInverse<'a> {
             return Answer::none();
         }
         let answer = solve(work);
-        self.note_fault(work.pull.rod.as_mut(), work.rise.as_mut());
+        self.note_fault(work.problem.rod.as_mut(), work.from_rest.as_mut());
         answer
     }
 
     /// Keeps the first fault of an obstacle's function.
-    fn note_fault(&self, rod: &mut dyn Equilibrium, rise: Option<&mut Rise<'_>>) {
-        let own = rise.and_then(Rise::take_fault);
+    fn note_fault(&self, rod: &mut dyn Equilibrium, from_rest: Option<&mut FromRest<'_>>) {
+        let own = from_rest.and_then(FromRest::take_fault);
         if let Some(new) = rod.take_fault().or(own) {
             self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(new);
         }
     }
 
     /// The robot under tensions, at rest.
-    fn balance<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Box<dyn Equilibrium + 'w> {
+    fn equilibrium<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Box<dyn Equilibrium + 'w> {
         match &self.loaded {
             Some(rod) => Box::new(ContactRod::new(rod.clone(), stop)),
             None => Box::new(self.rest.clone()),
         }
     }
 
-    fn rise<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Option<Rise<'w>> {
-        self.loaded.as_ref().map(|rod| Rise::new(rod, self.robot, stop))
+    fn from_rest<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Option<FromRest<'w>> {
+        self.loaded.as_ref().map(|rod| FromRest::new(rod, self.robot, stop))
     }
 
     fn write_tensions_of(&self, rod: &dyn Equilibrium, place: &mut [f64]) {
@@ -181,7 +222,7 @@ impl<'a> RodInverse<'a> {
     }
 
     /// Tendons only pull, within bounds.
-    fn bound(&mut self, bounds: &Bounds) {
+    fn add_tension_bounds(&mut self, bounds: &Bounds) {
         let count = self.units.len();
         for (k, name) in self.robot.tendon_names().iter().enumerate() {
             let unit = self.units[k] * self.rest.unit();
@@ -190,11 +231,11 @@ impl<'a> RodInverse<'a> {
             let upper = (upper / unit).min(lower + MOST);
             let mut normal = vec![0.0; count];
             normal[k] = 1.0;
-            self.space.region.bound(&normal, upper);
+            self.space.region.add_bound(&normal, upper);
             self.labels.push(format!("tension of '{name}'"));
             normal[k] = -1.0;
-            self.space.region.bound(&normal, -lower);
-            // A slack tendon is no news.
+            self.space.region.add_bound(&normal, -lower);
+            // A slack tendon has no label: messages do not name it.
             self.labels.push(if lower > 0.0 {
                 format!("pretension of '{name}'")
             } else {
@@ -205,37 +246,38 @@ impl<'a> RodInverse<'a> {
         }
     }
 
-    /// Seeks from the point at hand, if it is one to start from, then from all starts.
+    /// Searches from the current point, if `given`, then from all starts.
     fn search(
         &self,
         target: &Target,
         given: bool,
-        effort: Effort<'_>,
+        options: SearchOptions<'_>,
         work: &mut RodScratch<'_>,
     ) -> Answer {
-        let RodScratch { pull, search, guess, bends, met, before: row_before, .. } = work;
+        let RodScratch { problem, search, guess, bends, met, before: row_before, .. } = work;
         *row_before = None;
-        pull.aim.aim.at(*target);
-        let first: Vec<f64> = if given { self.unknowns(pull.rod.tensions()) } else { Vec::new() };
+        problem.goal.pose_residual.set_target(*target);
+        let first: Vec<f64> =
+            if given { self.unknowns(problem.rod.tensions()) } else { Vec::new() };
         let before = usize::from(given);
         let start = |k: usize, point: &mut Vec<f64>| {
             if given && k == 0 {
                 point.clone_from(&first);
             } else {
-                self.begin(target, k - before, guess.as_mut(), bends, point);
+                self.start_point(target, k - before, guess.as_mut(), bends, point);
             }
         };
-        let found = match &mut work.rise {
-            Some(rise) => rise.search(pull, search, &self.space, effort, start),
-            None => search.run(pull, &self.space, effort, start),
+        let found = match &mut work.from_rest {
+            Some(from_rest) => from_rest.search(problem, search, &self.space, options, start),
+            None => search.run(problem, &self.space, options, start),
         };
         *met = found.status == Status::Converged;
-        ended(found, pull, search, |goal| goal.aim.misses())
+        evaluate_answer(found, problem, search, |goal| goal.pose_residual.errors())
     }
 
-    fn effort(&self, starts: usize) -> Effort<'_> {
+    fn options(&self, starts: usize) -> SearchOptions<'_> {
         let starts = if self.loaded.is_some() { starts.min(LOADED) } else { starts };
-        Effort {
+        SearchOptions {
             first: 0,
             starts,
             max_iterations: self.settings.max_iterations,
@@ -259,7 +301,7 @@ impl<'a> RodInverse<'a> {
 
 impl Inverter for RodInverse<'_> {
     type Start = State;
-    type Work<'w>
+    type Scratch<'w>
         = RodScratch<'w>
     where
         Self: 'w;
@@ -294,63 +336,63 @@ impl Inverter for RodInverse<'_> {
     fn buffers<'w>(&'w self, stop: Option<&'w AtomicBool>) -> RodScratch<'w> {
         let lengths = self.rest.rest_lengths();
         RodScratch {
-            pull: Pull::new(
-                self.balance(stop),
-                ToolGoal::new(Aim::new(self.robot, &self.settings)),
+            problem: TensionProblem::new(
+                self.equilibrium(stop),
+                PoseGoal::new(PoseResidual::new(self.robot, &self.settings)),
                 lengths,
                 &self.units,
                 &self.ranges,
             ),
-            search: Search { stop, ..Search::default() },
-            guess: self.arcs.as_ref().map(ConstantCurvatureInverse::workspace),
+            search: Multistart { stop, ..Multistart::default() },
+            guess: self.arcs.as_ref().map(ConstantCurvatureInverse::scratch),
             bends: Vec::new(),
             met: false,
             before: None,
-            rise: self.rise(stop),
+            from_rest: self.from_rest(stop),
         }
     }
 
     /// The start is a shape with its tensions.
     fn solve(&self, target: &Target, start: Option<&State>, work: &mut RodScratch<'_>) -> Answer {
-        self.watched(work, |work| {
-            work.pull.forget();
+        self.solve_without_fault(work, |work| {
+            work.problem.forget();
             let given = if let Some(state) = start {
-                work.pull.rod.begin(state)
+                work.problem.rod.begin(state)
             } else {
-                work.pull.rod.rest();
+                work.problem.rod.rest();
                 false
             };
-            self.search(target, given, self.effort(self.settings.starts), work)
+            self.search(target, given, self.options(self.settings.starts), work)
         })
     }
 
-    /// In steps between which the tool is moved and turned evenly, where one step does not lead there without a
+    /// Moves and turns the tool in even steps where one step does not lead there without a
     /// jump; from a few other starts only when that fails, and then `starts` is more than 1.
     fn follow(&self, target: &Target, work: &mut RodScratch<'_>) -> Answer {
-        self.watched(work, |work| self.go_on(target, work))
+        self.solve_without_fault(work, |work| self.track(target, work))
     }
 
     fn write_tensions(&self, work: &RodScratch<'_>, place: &mut [f64]) {
-        self.write_tensions_of(work.pull.rod.as_ref(), place);
+        self.write_tensions_of(work.problem.rod.as_ref(), place);
     }
 
     fn state(&self, work: &mut RodScratch<'_>) -> Option<State> {
-        work.pull.rod.state()
+        work.problem.rod.state()
     }
 
     fn message(&self, answer: &Answer, work: &RodScratch<'_>) -> String {
         if answer.status == Status::Infeasible {
-            return self.shapeless(answer);
+            return self.no_shape_message(answer);
         }
-        let held = self.held(&work.search.point, &work.pull);
-        let told = tell(answer, &self.settings, &held, "tension");
-        match &work.rise {
-            Some(rise) if told.is_empty() => rise.message().to_owned(),
+        let active = self.active_bounds(&work.search.point, &work.problem);
+        let told = message_of(answer, &self.settings, &active, "tension");
+        match &work.from_rest {
+            Some(from_rest) if told.is_empty() => from_rest.message().to_owned(),
             _ => told,
         }
     }
 
     fn write_displacements(&self, work: &RodScratch<'_>, place: &mut [f64]) {
-        work.pull.write_displacements(place);
+        work.problem.write_displacements(place);
     }
 }

@@ -1,4 +1,4 @@
-//! Where searches begin.
+//! Starting tensions of a search.
 
 use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{RodInverse, WIDEST};
 use crate::inverse::Target;
 use crate::inverse::constant_curvature::{self, arc_to};
-use crate::solve::bounded_program::Bounded;
+use crate::solve::bounded_program::BoundedProgram;
 
 /// Every other random start is no wider than this.
 const USUAL: f64 = 1.5;
@@ -17,7 +17,7 @@ const RIDGE: f64 = 1e-6;
 impl RodInverse<'_> {
     /// The k-th start: what tensions come nearest to the arcs of constant curvature, or to a single arc to the
     /// target; hardly pulled; and random ones, each from its own stream.
-    pub(super) fn begin(
+    pub(super) fn start_point(
         &self,
         target: &Target,
         k: usize,
@@ -27,26 +27,26 @@ impl RodInverse<'_> {
     ) {
         match (&self.arcs, guess) {
             (Some(arcs), Some(guess)) if k.is_multiple_of(2) => {
-                arcs.guess(target, k / 2, guess, bends);
-                self.towards(bends, point);
+                arcs.guess_bends(target, k / 2, guess, bends);
+                self.tensions_for_bends(bends, point);
             }
             _ if k == 0 => {
                 self.single_arc(target, bends);
-                self.towards(bends, point);
+                self.tensions_for_bends(bends, point);
             }
             _ => self.random(k, point),
         }
     }
 
-    /// The tensions that bend the rod most nearly so, by its stiffness at rest.
-    pub(super) fn towards(&self, bends: &[Vector2<f64>], point: &mut Vec<f64>) {
+    /// Tensions that bend the rod most nearly so, by its stiffness at rest.
+    pub(super) fn tensions_for_bends(&self, bends: &[Vector2<f64>], point: &mut Vec<f64>) {
         let turns: Vec<_> = bends.iter().map(|b| Vector3::new(-b.y, b.x, 0.0)).collect();
         let mut right = Vec::new();
         let mut matrix = self.rest.shorten(&turns, &mut right).to_vec();
         let count = right.len();
         let trace: f64 = (0..count).map(|k| matrix[k * (count + 1)]).sum();
         (0..count).for_each(|k| matrix[k * (count + 1)] += RIDGE * trace);
-        let mut program = Bounded::default();
+        let mut program = BoundedProgram::default();
         // What it leaves when it does not end is a start too.
         let _ = program.solve(&matrix, &right, &vec![0.0; count], |_| false);
         point.clear();

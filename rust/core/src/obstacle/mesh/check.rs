@@ -1,4 +1,4 @@
-//! Whether triangles are the surface of a solid.
+//! Checks that triangles are the surface of a solid.
 
 use std::collections::HashMap;
 

@@ -16,6 +16,19 @@ use crate::lie::Pose;
 use surface::Surface;
 
 /// The inside of a closed surface of triangles. Clones share the triangles.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::Mesh;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// // A tetrahedron, its faces counter-clockwise from outside.
+/// let vertices = [Vector3::zeros(), Vector3::x() * 0.1, Vector3::y() * 0.1, Vector3::z() * 0.1];
+/// let mesh = Mesh::new(&vertices, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])?;
+/// assert_eq!(mesh.vertices().len(), 4);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Mesh {
     surface: Arc<Surface>,

@@ -21,7 +21,7 @@ enum Place {
     Vertex(usize),
 }
 
-/// Where a triangle is nearest to a point.
+/// Nearest point of a triangle to a point.
 #[derive(Clone, Copy, Debug)]
 struct Hit {
     face: usize,
@@ -185,7 +185,7 @@ impl Surface {
         }
     }
 
-    /// Whether the free space is convex in an edge or vertex: the faces there bound it together.
+    /// True when the free space is convex in an edge or vertex: the faces there bound it together.
     fn is_hollow(&self, place: Place, inside: bool) -> bool {
         let hollow = if inside { Fold::Ridge } else { Fold::Valley };
         match place {
@@ -202,7 +202,7 @@ impl Surface {
         }
     }
 
-    /// Whether a triangle's nearest place is the nearest of the surface around it. Of the triangles
+    /// True when a triangle's nearest point is the nearest of the surface around it. Of the triangles
     /// that share the place only one says so.
     fn is_nearest_around(&self, hit: &Hit, x: &Vector3<f64>) -> bool {
         match hit.place {

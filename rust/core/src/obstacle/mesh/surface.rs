@@ -13,7 +13,7 @@ use crate::error::InvalidInput;
 /// in which STL files are written, tilts long thin triangles by this much.
 const FLAT: f64 = 1e-6;
 
-/// How the surface folds along an edge, seen from outside.
+/// Fold of the surface along an edge, seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fold {
     Flat,
@@ -33,7 +33,7 @@ pub(super) struct Edge {
     pub(super) fold: Fold,
 }
 
-/// What a vertex is, apart from being where triangles meet.
+/// Kind of a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Corner {
     /// A point within a plane face.

@@ -1,4 +1,4 @@
-//! Many goals, on all cores.
+//! Batches of goals, on all cores.
 
 use std::sync::atomic::Ordering;
 
@@ -11,9 +11,26 @@ use crate::batch::Control;
 use crate::error::InvalidInput;
 
 /// A goal and the seed of its first swarm.
+///
+/// ```
+/// use nalgebra::Vector2;
+/// use tdcr::batch::{Control, pool};
+/// use tdcr::planar::{Goal, Row, SwarmSettings, SwarmSolver, Trunk, solve_rows};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let trunk = Trunk::new(vec![0.14, 0.12], 0.06)?;
+/// let solver = SwarmSolver::new(&trunk, &[], &SwarmSettings::default())?;
+/// let goal = Goal { point: Vector2::new(0.2, 0.06), heading: None, limits: vec![3.0] };
+/// let rows = [0, 1].map(|seed| Row { goal: goal.clone(), seed });
+/// let threads = pool(Some(1))?;
+/// let found = solve_rows(&solver, &rows, &threads, &Control::default())?;
+/// assert_eq!(found.map(|found| found.len()), Some(2));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// What is asked of the tip.
+    /// Goal of the tip.
     pub goal: Goal,
     /// Seed.
     pub seed: u64,
@@ -37,7 +54,7 @@ pub fn solve_rows(
 ) -> Result<Rows, InvalidInput> {
     let stopped = || control.stop.load(Ordering::Relaxed);
     let job = |rows: &[Row]| {
-        // The jobs that are left cost nothing, not even a swarm's memory.
+        // The remaining jobs cost nothing, not even a swarm's memory.
         if stopped() {
             return Ok(Vec::new());
         }

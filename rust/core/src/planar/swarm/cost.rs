@@ -1,27 +1,27 @@
-//! What the swarm lowers, in units of the trunk's length.
+//! Cost of a particle, in units of the trunk's length.
 
 use std::f64::consts::TAU;
 
 use super::super::chord::Point;
 use super::super::clearance::{Circle, clearance};
 use super::super::newton_inverse::Solver;
-use super::super::tip_equations::HEADING;
+use super::super::tip_equations::HEADING_WEIGHT;
 
 /// Half-turns below this \[rad\] have a chord of the arc's length to rounding.
 const STRAIGHT: f64 = 1e-8;
 
 /// Direction in \[-pi, pi\] of an angle.
-fn wrapped(angle: f64) -> f64 {
+fn wrap_angle(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// What a heading is off, as a length.
+/// Error of a heading, as a length.
 fn heading_miss(heading: Option<f64>, sum: f64) -> f64 {
-    heading.map_or(0.0, |heading| HEADING * wrapped(sum - heading))
+    heading.map_or(0.0, |heading| HEADING_WEIGHT * wrap_angle(sum - heading))
 }
 
 /// Turns: the distance of the tip from the target and the heading's miss, as one length.
-pub(super) fn of_bends(solver: &Solver<'_>, turns: &[f64]) -> f64 {
+pub(super) fn tip_error(solver: &Solver<'_>, turns: &[f64]) -> f64 {
     let (mut at, mut frame, mut sum) = (Point::new(0.0, 0.0), Point::new(1.0, 0.0), 0.0);
     for (turn, length) in turns.iter().zip(&solver.problem.lengths) {
         let half = 0.5 * turn;
@@ -37,10 +37,10 @@ pub(super) fn of_bends(solver: &Solver<'_>, turns: &[f64]) -> f64 {
     off.norm_sqr().sqrt().hypot(heading_miss(solver.heading, sum))
 }
 
-/// Room left to the circles, so that what is clear here is so in metres, whatever the rounding.
+/// Margin to the circles, so that turns that are clear here are clear in metres, whatever the rounding.
 const SKIN: f64 = 1e-14;
 
-/// How deep the trunk reaches into the circles.
+/// Depth by which the trunk enters the circles.
 pub(super) fn depth(solver: &Solver<'_>, turns: &[f64], circles: &[Circle]) -> f64 {
     (SKIN - clearance(&solver.problem.lengths, turns, circles)).max(0.0)
 }
@@ -48,7 +48,7 @@ pub(super) fn depth(solver: &Solver<'_>, turns: &[f64], circles: &[Circle]) -> f
 /// Platforms (x, y) between the base and the target: `sum |c_i h_i/sin(h_i) - l_i|`, the length of the
 /// arc from platform to platform (chord c, half-turn h, the direction of the chord in the frame of the
 /// platform before) against the section's. Limits and a heading count as lengths too. Fills the turns.
-pub(super) fn of_points(solver: &Solver<'_>, places: &[f64], turns: &mut Vec<f64>) -> f64 {
+pub(super) fn length_error(solver: &Solver<'_>, places: &[f64], turns: &mut Vec<f64>) -> f64 {
     let problem = &solver.problem;
     let (mut at, mut frame, mut sum) = (Point::new(0.0, 0.0), Point::new(1.0, 0.0), 0.0);
     let mut value = 0.0;
@@ -76,7 +76,7 @@ pub(super) fn of_points(solver: &Solver<'_>, places: &[f64], turns: &mut Vec<f64
 
 /// Turns on the target, the nearest to given ones in energy: what is kept of a particle where circles
 /// choose among the answers.
-pub(super) struct Landed {
+pub(super) struct Projection {
     /// Energy of a clear answer; above that of any, by the miss and the depth, for what is none. So
     /// every answer comes before what is none, without weights (Deb 2000,
     /// [10.1016/S0045-7825(99)00389-8](https://doi.org/10.1016/S0045-7825(99)00389-8)).
@@ -84,15 +84,19 @@ pub(super) struct Landed {
     pub(super) clear: bool,
 }
 
-/// Brings turns onto the target, in place, and weighs them.
-pub(super) fn land(solver: &mut Solver<'_>, turns: &mut Vec<f64>, circles: &[Circle]) -> Landed {
+/// Brings turns onto the target, in place, and evaluates them.
+pub(super) fn project_onto_target(
+    solver: &mut Solver<'_>,
+    turns: &mut Vec<f64>,
+    circles: &[Circle],
+) -> Projection {
     solver.unwind(turns);
-    solver.work.held.clear();
-    let miss = solver.problem.reach(turns, &mut solver.work);
+    solver.work.fixed.clear();
+    let miss = solver.problem.move_onto_target(turns, &mut solver.work);
     let depth = depth(solver, turns, circles);
-    if miss * solver.whole <= solver.settings.tolerance && depth == 0.0 {
-        return Landed { value: solver.problem.energy(turns), clear: true };
+    if miss * solver.total_length <= solver.settings.tolerance && depth == 0.0 {
+        return Projection { value: solver.problem.energy(turns), clear: true };
     }
     let most = solver.problem.energy(&solver.problem.limits);
-    Landed { value: most + miss + depth, clear: false }
+    Projection { value: most + miss + depth, clear: false }
 }

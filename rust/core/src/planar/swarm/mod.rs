@@ -1,6 +1,6 @@
 //! The inverse by particle swarm: any number of sections, headings, limits, circles to stay out of.
 //!
-//! A swarm looks for the neighbourhood of an answer, Newton's method ends it. Unknown are the turns of
+//! A swarm finds the neighbourhood of an answer, Newton's method the answer. Unknown are the turns of
 //! the sections, whose lengths then hold by construction, or, as in the paper, the platforms between
 //! them, with the lengths as penalties. `docs/planar.md` has the mathematics.
 
@@ -9,16 +9,25 @@ mod cost;
 mod objective;
 mod result;
 mod search;
+mod watch;
 
 pub use batch::{Row, Rows, solve_rows};
 pub use result::SwarmInverse;
-pub use search::{SwarmSolver, WatchDecision};
+pub use search::SwarmSolver;
+pub use watch::WatchDecision;
 
 use super::newton_inverse::InverseSettings;
 use crate::error::InvalidInput;
 use crate::solve::pso::PsoSettings;
 
-/// What the particles are.
+/// Unknowns that a particle stands for.
+///
+/// ```
+/// use tdcr::planar::{SwarmSettings, Unknowns};
+///
+/// let settings = SwarmSettings { unknowns: Unknowns::Points, ..SwarmSettings::default() };
+/// assert_eq!(settings.unknowns.as_str(), "points");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Unknowns {
     /// The turns of the sections; the value is the distance of the tip from the target.
@@ -44,13 +53,20 @@ impl Unknowns {
 }
 
 /// The swarm and what follows it.
+///
+/// ```
+/// use tdcr::planar::SwarmSettings;
+///
+/// let settings = SwarmSettings { restarts: 3, polish: false, ..SwarmSettings::default() };
+/// assert!(settings.validate().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwarmSettings {
     /// The swarm; its budgets are those of one swarm. Its seed is that of the first.
     pub swarm: PsoSettings,
-    /// What the particles are.
+    /// Unknowns that a particle stands for.
     pub unknowns: Unknowns,
-    /// Whether Newton's method takes over from the swarm, tries its best points on the way, and brings
+    /// True for Newton's method to take over from the swarm: it tries its best points on the way, and brings
     /// the answer to `tolerance` and the least bending energy nearby.
     pub polish: bool,
     /// Miss of the target that counts as none \[m\]; a heading counts one trunk length per whole turn.

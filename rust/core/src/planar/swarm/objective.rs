@@ -3,12 +3,12 @@
 use super::super::clearance::Circle;
 use super::super::least_energy::descend;
 use super::super::newton_inverse::{Inverse, Solver};
-use super::super::tip_equations::HEADING;
+use super::super::tip_equations::HEADING_WEIGHT;
 use super::super::trunk::Trunk;
 use super::Unknowns;
-use super::cost::{depth, land, of_bends, of_points};
+use super::cost::{depth, length_error, project_onto_target, tip_error};
 use super::result::SwarmInverse;
-use super::search::WatchDecision;
+use super::watch::WatchDecision;
 use crate::solve::pso::{Objective, Progress, Report};
 use crate::status::Status;
 
@@ -17,23 +17,23 @@ use crate::status::Status;
 const NEAR: f64 = 0.1;
 const NEARER: f64 = 0.5;
 
-/// What becomes of the swarm's points.
+/// Handover from the swarm to Newton's method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Task {
+pub(super) enum Handover {
     /// The best one is the answer.
-    AsItIs,
+    None,
     /// The best one is where Newton's method starts, as soon as it gets to the target from there.
     Polish,
     /// All are brought onto the target; energy and circles choose among them.
-    Choose,
+    Constrain,
 }
 
 /// Watches the swarms of one search and evaluates their points. Values are in units of the trunk's
 /// length.
-pub(super) struct Hunt<'s, 'a> {
+pub(super) struct SwarmObjective<'s, 'a> {
     solver: Solver<'a>,
     unknowns: Unknowns,
-    task: Task,
+    handover: Handover,
     circles: &'s [Circle],
     watch: &'s mut dyn FnMut(&Progress) -> WatchDecision,
     turns: Vec<f64>,
@@ -42,15 +42,15 @@ pub(super) struct Hunt<'s, 'a> {
     /// Lowest value of the swarm in work, and its turns.
     lowest: (f64, Vec<f64>),
     /// No point of the swarm in work was evaluated yet.
-    fresh: bool,
+    first_evaluation: bool,
     /// The starts of a swarm that follows one without an answer: Newton's method is tried from all.
-    crowd: Vec<Vec<f64>>,
+    swarm_starts: Vec<Vec<f64>>,
     /// Value below which Newton's method is tried next, and the one that it was tried at.
-    near: f64,
-    tried: f64,
-    tries: usize,
+    polish_below: f64,
+    polished_at: f64,
+    polish_count: usize,
     /// Energy and turns of the answer; unsettled as long as the energy has no minimum there.
-    reached: Option<(f64, Vec<f64>)>,
+    answer: Option<(f64, Vec<f64>)>,
     /// The answer was found; the watcher wants no other.
     done: bool,
     finish: bool,
@@ -64,25 +64,27 @@ pub(super) struct Hunt<'s, 'a> {
 /// The watcher wants nothing any more.
 pub(super) struct Abandoned;
 
-impl Objective for Hunt<'_, '_> {
+impl Objective for SwarmObjective<'_, '_> {
     type Error = Abandoned;
 
     fn values(&mut self, points: &[f64], n: usize, values: &mut [f64]) -> Result<(), Abandoned> {
         let scale = self.scale();
-        let again = self.task == Task::Polish && self.fresh && !self.ends.is_empty();
-        self.fresh = false;
+        let again =
+            self.handover == Handover::Polish && self.first_evaluation && !self.ends.is_empty();
+        self.first_evaluation = false;
         for (value, point) in values.iter_mut().zip(points.chunks_exact(n)) {
-            let own = self.weigh(point);
-            if own < self.lowest.0 {
-                self.lowest.0 = own;
+            let current = self.value_of(point);
+            if current < self.lowest.0 {
+                self.lowest.0 = current;
                 self.lowest.1.clear();
-                let plain = self.unknowns == Unknowns::Bends && self.task != Task::Choose;
+                let plain =
+                    self.unknowns == Unknowns::Bends && self.handover != Handover::Constrain;
                 self.lowest.1.extend_from_slice(if plain { point } else { &self.turns });
             }
-            *value = scale * own;
+            *value = scale * current;
             if again {
                 let plain = self.unknowns == Unknowns::Bends;
-                self.crowd.push(if plain { point.to_vec() } else { self.turns.clone() });
+                self.swarm_starts.push(if plain { point.to_vec() } else { self.turns.clone() });
             }
         }
         Ok(())
@@ -98,41 +100,41 @@ impl Objective for Hunt<'_, '_> {
             }
             WatchDecision::Abandon => return Err(Abandoned),
         }
-        for turns in std::mem::take(&mut self.crowd) {
+        for turns in std::mem::take(&mut self.swarm_starts) {
             if !self.done {
-                self.try_from(&turns);
+                self.polish_from(&turns);
             }
         }
-        if self.task == Task::Polish && !self.done && self.lowest.0 < self.near {
-            self.take_over();
+        if self.handover == Handover::Polish && !self.done && self.lowest.0 < self.polish_below {
+            self.polish_best();
         }
         Ok(self.done)
     }
 }
 
-impl<'s, 'a> Hunt<'s, 'a> {
+impl<'s, 'a> SwarmObjective<'s, 'a> {
     pub(super) fn new(
         solver: Solver<'a>,
         unknowns: Unknowns,
-        task: Task,
+        handover: Handover,
         circles: &'s [Circle],
         watch: &'s mut dyn FnMut(&Progress) -> WatchDecision,
     ) -> Self {
         Self {
             solver,
             unknowns,
-            task,
+            handover,
             circles,
             watch,
             turns: Vec::new(),
             last: None,
             lowest: (f64::INFINITY, Vec::new()),
-            fresh: true,
-            crowd: Vec::new(),
-            near: NEAR,
-            tried: f64::INFINITY,
-            tries: 0,
-            reached: None,
+            first_evaluation: true,
+            swarm_starts: Vec::new(),
+            polish_below: NEAR,
+            polished_at: f64::INFINITY,
+            polish_count: 0,
+            answer: None,
             done: false,
             finish: false,
             ends: Vec::new(),
@@ -142,49 +144,53 @@ impl<'s, 'a> Hunt<'s, 'a> {
         }
     }
 
-    /// From values to what is told: metres, or energies in 1/m.
+    /// Scale of the values that the swarm reports: metres, or energies in 1/m.
     fn scale(&self) -> f64 {
-        if self.task == Task::Choose { 1.0 / self.solver.whole } else { self.solver.whole }
+        if self.handover == Handover::Constrain {
+            1.0 / self.solver.total_length
+        } else {
+            self.solver.total_length
+        }
     }
 
-    /// The value of a particle. Where its coordinates are not the turns, these are left in `turns`.
-    fn weigh(&mut self, point: &[f64]) -> f64 {
+    /// Value of a particle. Where its coordinates are not the turns, these are written to `turns`.
+    fn value_of(&mut self, point: &[f64]) -> f64 {
         if self.unknowns == Unknowns::Points {
-            return of_points(&self.solver, point, &mut self.turns);
+            return length_error(&self.solver, point, &mut self.turns);
         }
-        if self.task == Task::Choose {
+        if self.handover == Handover::Constrain {
             self.turns.clear();
             self.turns.extend_from_slice(point);
-            return land(&mut self.solver, &mut self.turns, self.circles).value;
+            return project_onto_target(&mut self.solver, &mut self.turns, self.circles).value;
         }
-        of_bends(&self.solver, point) + depth(&self.solver, point, self.circles)
+        tip_error(&self.solver, point) + depth(&self.solver, point, self.circles)
     }
 
     /// Newton's method from the best point.
-    fn take_over(&mut self) {
-        self.tried = self.lowest.0;
-        self.near = NEARER * self.tried;
+    fn polish_best(&mut self) {
+        self.polished_at = self.lowest.0;
+        self.polish_below = NEARER * self.polished_at;
         let turns = std::mem::take(&mut self.lowest.1);
-        self.try_from(&turns);
+        self.polish_from(&turns);
         self.lowest.1 = turns;
     }
 
     /// Newton's method: onto the target, and to the least energy nearby.
-    fn try_from(&mut self, turns: &[f64]) {
-        self.tries += 1;
+    fn polish_from(&mut self, turns: &[f64]) {
+        self.polish_count += 1;
         self.solver.try_start(turns);
-        let Some((energy, settled, turns)) = self.solver.best.take() else { return };
-        self.done = settled;
-        if settled || self.reached.as_ref().is_none_or(|(least, _)| energy < *least) {
-            self.reached = Some((energy, turns));
+        let Some((energy, stationary, turns)) = self.solver.best.take() else { return };
+        self.done = stationary;
+        if stationary || self.answer.as_ref().is_none_or(|(least, _)| energy < *least) {
+            self.answer = Some((energy, turns));
         }
     }
 
     /// Before every swarm.
     pub(super) fn begin(&mut self) {
-        self.fresh = true;
-        self.near = NEAR;
-        self.tried = f64::INFINITY;
+        self.first_evaluation = true;
+        self.polish_below = NEAR;
+        self.polished_at = f64::INFINITY;
         self.lowest.0 = f64::INFINITY;
         self.lowest.1.clear();
     }
@@ -198,11 +204,13 @@ impl<'s, 'a> Hunt<'s, 'a> {
             least = least.min(*value);
             least
         }));
-        match self.task {
-            Task::AsItIs => self.done = report.status == Status::Converged,
-            Task::Polish if !self.done && self.lowest.0 < self.tried => self.take_over(),
-            Task::Polish => {}
-            Task::Choose => self.settle(),
+        match self.handover {
+            Handover::None => self.done = report.status == Status::Converged,
+            Handover::Polish if !self.done && self.lowest.0 < self.polished_at => {
+                self.polish_best()
+            }
+            Handover::Polish => {}
+            Handover::Constrain => self.select_clear(),
         }
         self.ends.push(self.lowest.clone());
         self.done || self.finish
@@ -210,34 +218,34 @@ impl<'s, 'a> Hunt<'s, 'a> {
 
     /// Among circles: the swarm's best is the answer if it is clear of them, and so is the least energy
     /// nearby if that is clear as well.
-    fn settle(&mut self) {
+    fn select_clear(&mut self) {
         let mut turns = self.lowest.1.clone();
         if turns.is_empty() {
             return;
         }
-        self.tries += 1;
+        self.polish_count += 1;
         let solver = &mut self.solver;
-        self.done = land(solver, &mut turns, self.circles).clear;
+        self.done = project_onto_target(solver, &mut turns, self.circles).clear;
         if !self.done {
             return;
         }
         let clear = turns.clone();
-        let tolerance = solver.settings.tolerance / solver.whole;
+        let tolerance = solver.settings.tolerance / solver.total_length;
         let most = solver.settings.max_iterations;
-        solver.work.held.clear();
-        let (settled, steps) =
+        solver.work.fixed.clear();
+        let (stationary, steps) =
             descend(&solver.problem, &mut turns, tolerance, most, solver.stop, &mut solver.work);
         solver.iterations += steps;
-        if !settled || depth(solver, &turns, self.circles) > 0.0 {
+        if !stationary || depth(solver, &turns, self.circles) > 0.0 {
             turns = clear;
         }
-        self.reached = Some((solver.problem.energy(&turns), turns));
+        self.answer = Some((solver.problem.energy(&turns), turns));
     }
 
-    /// Where all swarms missed the target: Newton's method from its own starts, the straight trunk, and
+    /// Newton's method after all swarms missed the target, from its own starts, the straight trunk, and
     /// the straight one turned towards the target by its first section. The watcher is asked between.
     pub(super) fn last_resort(&mut self) -> Result<(), Abandoned> {
-        if self.task != Task::Polish || self.done || self.finish {
+        if self.handover != Handover::Polish || self.done || self.finish {
             return Ok(());
         }
         let n = self.solver.problem.lengths.len();
@@ -248,15 +256,15 @@ impl<'s, 'a> Hunt<'s, 'a> {
         starts.extend(self.solver.exact_starts());
         starts.extend(self.solver.spread_starts());
         for start in &starts {
-            self.try_from(start);
-            if self.done || self.asked()? {
+            self.polish_from(start);
+            if self.done || self.poll_watcher()? {
                 return Ok(());
             }
         }
-        if self.reached.is_none() {
+        if self.answer.is_none() {
             for start in &starts {
                 self.solver.try_nearest(start);
-                if self.asked()? {
+                if self.poll_watcher()? {
                     return Ok(());
                 }
             }
@@ -264,8 +272,8 @@ impl<'s, 'a> Hunt<'s, 'a> {
         Ok(())
     }
 
-    /// Whether the watcher, told of the last move again, wants the best that there is by now.
-    fn asked(&mut self) -> Result<bool, Abandoned> {
+    /// Calls the watcher with the last move again; true when it wants the best answer so far.
+    fn poll_watcher(&mut self) -> Result<bool, Abandoned> {
         let Some(last) = &self.last else { return Ok(false) };
         match (self.watch)(last) {
             WatchDecision::GoOn => {}
@@ -277,23 +285,25 @@ impl<'s, 'a> Hunt<'s, 'a> {
 
     /// The answer of a search from a seed, for a trunk and circles in metres; a miss up to `tolerance`
     /// \[m\] counts as none where Newton's method has not decided.
-    pub(super) fn answer(
+    pub(super) fn into_result(
         mut self,
         seed: u64,
         tolerance: f64,
         trunk: &Trunk,
         circles: &[Circle],
     ) -> SwarmInverse {
+        // Lowest points of the swarms, best first.
         let mut ends = std::mem::take(&mut self.ends);
         let swarms = ends.len();
         // A swarm that saw no value below infinity has no best.
         ends.retain(|end| !end.1.is_empty());
         ends.sort_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((energy, turns)) = self.reached.take() {
+        // The answer on the target; else the nearest points from all ends; without polish the best end.
+        if let Some((energy, turns)) = self.answer.take() {
             self.solver.best = Some((energy, self.done, turns));
-        } else if self.task == Task::Polish {
+        } else if self.handover == Handover::Polish {
             for end in &ends {
-                self.tries += 1;
+                self.polish_count += 1;
                 self.solver.try_nearest(&end.1);
             }
         } else {
@@ -303,11 +313,12 @@ impl<'s, 'a> Hunt<'s, 'a> {
                 (0.0, true, turns)
             });
         }
-        let whole = self.solver.whole;
-        let mut inverse = self.solver.answer(self.tries);
+        // Status: Newton's, or that of the swarm's own point.
+        let total_length = self.solver.total_length;
+        let mut inverse = self.solver.into_inverse(self.polish_count);
         let clearance = trunk.clearance(&inverse.turns, circles);
-        if self.task != Task::Polish {
-            inverse.status = standing(&inverse, clearance, whole, tolerance);
+        if self.handover != Handover::Polish {
+            inverse.status = status_of_swarm(&inverse, clearance, total_length, tolerance);
         } else if self.finish && inverse.status == Status::Unreachable {
             inverse.status = Status::IterationLimit;
         }
@@ -324,9 +335,9 @@ impl<'s, 'a> Hunt<'s, 'a> {
     }
 }
 
-/// How turns stand that Newton's method has not judged.
-fn standing(inverse: &Inverse, clearance: f64, whole: f64, tolerance: f64) -> Status {
-    let miss = inverse.error.hypot(whole * HEADING * inverse.heading_error);
+/// Status of turns that Newton's method has not polished.
+fn status_of_swarm(inverse: &Inverse, clearance: f64, total_length: f64, tolerance: f64) -> Status {
+    let miss = inverse.error.hypot(total_length * HEADING_WEIGHT * inverse.heading_error);
     match (miss <= tolerance, clearance >= 0.0) {
         (true, true) => Status::Converged,
         (true, false) => Status::Infeasible,

@@ -1,8 +1,24 @@
-//! What a search by swarm found.
+//! Result of a search by swarm.
 
 use super::super::newton_inverse::Inverse;
 
-/// Turns found by a swarm, and how the search went.
+/// Turns found by a swarm, and counters of the search.
+///
+/// ```
+/// use nalgebra::Vector2;
+/// use tdcr::planar::{Goal, SwarmSettings, SwarmSolver, Trunk, WatchDecision};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let trunk = Trunk::new(vec![0.14, 0.12], 0.06)?;
+/// let mut solver = SwarmSolver::new(&trunk, &[], &SwarmSettings::default())?;
+/// let goal = Goal { point: Vector2::new(0.2, 0.06), heading: None, limits: vec![3.0] };
+/// if let Some(found) = solver.solve(&goal, 0, &mut |_| WatchDecision::GoOn)? {
+///     assert!(found.clearance == f64::INFINITY && found.swarms == 1);
+///     assert_eq!(found.history.len(), found.moves + 1);
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SwarmInverse {
     /// The turns, how well they do, and the Newton steps and starts of the polish. `Infeasible`: the

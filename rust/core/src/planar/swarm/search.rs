@@ -3,22 +3,12 @@
 use super::super::clearance::Circle;
 use super::super::newton_inverse::{Goal, InverseSettings, Solver};
 use super::super::trunk::Trunk;
-use super::objective::{Hunt, Task};
+use super::objective::{Handover, SwarmObjective};
 use super::result::SwarmInverse;
+use super::watch::WatchDecision;
 use super::{SwarmSettings, Unknowns};
 use crate::error::InvalidInput;
 use crate::solve::pso::{Progress, PsoSettings, Swarm};
-
-/// What whoever watches a search wants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WatchDecision {
-    /// To go on.
-    GoOn,
-    /// The best that there is by now.
-    Finish,
-    /// Nothing any more.
-    Abandon,
-}
 
 /// The inverse of a trunk among circles by swarm, with its memory for any number of goals.
 ///
@@ -68,8 +58,11 @@ impl<'a> SwarmSolver<'a> {
                 return Err(InvalidInput::new("objective", expected, "\"points\""));
             }
         }
-        let whole: f64 = trunk.lengths().iter().sum();
-        let scale = |c: &Circle| Circle { center: c.center / whole, radius: c.radius / whole };
+        let total_length: f64 = trunk.lengths().iter().sum();
+        let scale = |c: &Circle| Circle {
+            center: c.center / total_length,
+            radius: c.radius / total_length,
+        };
         Ok(Self {
             trunk,
             circles,
@@ -93,47 +86,48 @@ impl<'a> SwarmSolver<'a> {
     ) -> Result<Option<SwarmInverse>, InvalidInput> {
         let solver = Solver::new(self.trunk, goal, &self.newton)?;
         let SwarmSettings { swarm, unknowns, polish, tolerance, restarts, .. } = self.settings;
-        let task = match (polish, self.circles.is_empty()) {
-            (false, _) => Task::AsItIs,
-            (true, true) => Task::Polish,
-            (true, false) => Task::Choose,
+        let handover = match (polish, self.circles.is_empty()) {
+            (false, _) => Handover::None,
+            (true, true) => Handover::Polish,
+            (true, false) => Handover::Constrain,
         };
-        let target = swarm.target.or((task == Task::AsItIs).then_some(tolerance));
+        let target = swarm.target.or((handover == Handover::None).then_some(tolerance));
         let half = half_box(&solver, unknowns);
         let lower: Vec<f64> = half.iter().map(|h| -h).collect();
         self.swarm.reset(PsoSettings { target, ..swarm }, &lower, &half)?;
-        if task == Task::Choose {
+        if handover == Handover::Constrain {
             let most = swarm.particles / 2;
-            self.swarm.start_from(&ways(&solver, most))?;
+            self.swarm.start_from(&exact_starts(&solver, most))?;
         }
         // Beyond the trunk's length there is nothing to find but the nearest point.
-        let far = solver.problem.target.norm() * solver.whole > solver.whole + tolerance;
-        let mut hunt = Hunt::new(solver, unknowns, task, &self.scaled, watch);
+        let far =
+            solver.problem.target.norm() * solver.total_length > solver.total_length + tolerance;
+        let mut objective = SwarmObjective::new(solver, unknowns, handover, &self.scaled, watch);
         for restart in 0..=if far { 0 } else { restarts as u64 } {
             self.swarm.reseed(seed.wrapping_add(restart));
-            hunt.begin();
-            let Ok(report) = self.swarm.run(&mut hunt) else { return Ok(None) };
-            if hunt.end(&report, self.swarm.history()) {
+            objective.begin();
+            let Ok(report) = self.swarm.run(&mut objective) else { return Ok(None) };
+            if objective.end(&report, self.swarm.history()) {
                 break;
             }
         }
-        if hunt.last_resort().is_err() {
+        if objective.last_resort().is_err() {
             return Ok(None);
         }
         let enough = target.unwrap_or(tolerance).max(tolerance);
-        Ok(Some(hunt.answer(seed, enough, self.trunk, self.circles)))
+        Ok(Some(objective.into_result(seed, enough, self.trunk, self.circles)))
     }
 }
 
 /// Ways to the target that know no circles: exact solutions of the sections in two groups. Each lies in
 /// another valley of the energy, and half of the swarm at most starts there.
-fn ways(solver: &Solver<'_>, most: usize) -> Vec<f64> {
-    let mut ways = solver.exact_starts();
-    ways.truncate(most);
-    for turns in &mut ways {
+fn exact_starts(solver: &Solver<'_>, most: usize) -> Vec<f64> {
+    let mut starts = solver.exact_starts();
+    starts.truncate(most);
+    for turns in &mut starts {
         solver.problem.clamp(turns);
     }
-    ways.concat()
+    starts.concat()
 }
 
 /// The box of the unknowns, to either side of zero: the limits, or what the sections up to a platform

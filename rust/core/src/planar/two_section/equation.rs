@@ -6,7 +6,7 @@ use crate::planar::chord::{Point, sinc};
 /// Bound of the derivative of sin(x)/x for any x.
 const SINC_SLOPE: f64 = 0.436_182;
 
-/// What the equation is at one turn of the first section.
+/// Scalar equation F at one turn of the first section.
 pub(super) struct Equation {
     /// Distance from the joint to the target.
     pub(super) distance: f64,
@@ -21,16 +21,16 @@ pub(super) struct Equation {
 
 /// Value and derivatives of the equation on one sheet of the angle.
 #[derive(Clone, Copy)]
-pub(super) struct Level {
+pub(super) struct EquationValue {
     pub(super) value: f64,
     pub(super) slope: f64,
     pub(super) second: f64,
     pub(super) sinc_slope: f64,
 }
 
-/// What an interval may hold on one sheet of the angle.
+/// Number of roots that an interval may have on one sheet of the angle.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Holds {
+pub(super) enum RootCount {
     /// No root.
     None,
     /// One at most: the equation is monotone.
@@ -58,12 +58,12 @@ impl Equation {
     }
 
     /// Distance minus chord of the second section, turned by twice `angle`.
-    pub(super) fn value(&self, l2: f64, angle: f64) -> Level {
+    pub(super) fn value(&self, l2: f64, angle: f64) -> EquationValue {
         let (value, slope) = sinc(angle, self.sin, self.cos);
         let (d, a) = (self.distance_rate, self.angle_rate);
         // sinc'' = -sinc - 2 sinc'/x.
         let curved = if angle.abs() < 1e-3 { -1.0 / 3.0 } else { -value - 2.0 * slope / angle };
-        Level {
+        EquationValue {
             value: self.distance - l2 * value,
             slope: d[0] - l2 * slope * a[0],
             second: d[1] - l2 * (curved * a[0] * a[0] + slope * a[1]),
@@ -79,7 +79,7 @@ pub(super) struct Bounds {
     distance: [f64; 2],
     /// First, second and third derivative of the angle.
     angle: [f64; 3],
-    /// How far the angle goes from its middle value.
+    /// Largest change of the angle from its middle value.
     pub(super) sweep: f64,
 }
 
@@ -112,7 +112,7 @@ impl Bounds {
 
     /// A bound of the second derivative of the equation, over the interval and directly or from its
     /// value in the middle. The n-th derivative of sin(x)/x is at most 1/(n + 1).
-    pub(super) fn bend(&self, at: &Level, half: f64) -> f64 {
+    pub(super) fn bend(&self, at: &EquationValue, half: f64) -> f64 {
         let [a1, a2, a3] = self.angle;
         let slope = (at.sinc_slope.abs() + self.sweep / 3.0).min(SINC_SLOPE);
         let direct = self.distance[0] + self.l2 * (a1 * a1 / 3.0 + slope * a2);
@@ -121,17 +121,17 @@ impl Bounds {
     }
 }
 
-/// What a bound on the second derivative says of an interval; values within `margin` of zero may be
+/// Root count of an interval by a bound on the second derivative; values within `margin` of zero may be
 /// zero.
-pub(super) fn judge(at: &Level, bend: f64, half: f64, margin: f64) -> Holds {
+pub(super) fn count_roots(at: &EquationValue, bend: f64, half: f64, margin: f64) -> RootCount {
     let curved = 0.5 * bend * half * half;
     if at.value.abs() > at.slope.abs() * half + curved + margin {
-        Holds::None
+        RootCount::None
     } else if at.slope.abs() > bend * half {
-        Holds::One
+        RootCount::One
     } else if curved < margin {
-        Holds::Touch
+        RootCount::Touch
     } else {
-        Holds::Unknown
+        RootCount::Unknown
     }
 }

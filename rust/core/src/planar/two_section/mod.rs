@@ -15,7 +15,20 @@ use crate::error::{InvalidInput, length};
 use polish::Tip;
 use search::{CORNER, EDGE, SAME, Search};
 
-/// Two sections of given lengths, ready to be asked for any number of targets.
+/// Two sections of given lengths, ready for any number of targets.
+///
+/// ```
+/// use tdcr::planar::TwoSections;
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let two = TwoSections::new(0.14, 0.12, std::f64::consts::TAU)?;
+/// let mut found = Vec::new();
+/// two.solutions(0.2, 0.06, &mut found);
+/// assert!(found.iter().all(|turns| (two.tip(*turns).y - 0.06).abs() < 1e-12));
+/// assert!(found.len() >= 2 && two.energy(found[0]) <= two.energy(found[1]));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoSections {
     lengths: [f64; 2],
@@ -57,7 +70,7 @@ impl TwoSections {
         self.search(x, y, found);
     }
 
-    /// As [`TwoSections::solutions`]; returns the number of intervals looked at.
+    /// Solutions as in [`TwoSections::solutions`]; returns the number of intervals examined.
     #[doc(hidden)]
     pub fn search(&self, x: f64, y: f64, found: &mut Vec<[f64; 2]>) -> usize {
         found.clear();
@@ -67,18 +80,18 @@ impl TwoSections {
         if target.norm().is_nan() || target.norm() > 1.0 + EDGE {
             return 0;
         }
-        let mut search = Search { tip, target, found, looks: 0 };
+        let mut search = Search { tip, target, found, interval_count: 0 };
         search.run();
         if target.norm() < CORNER {
             search.corners();
         }
-        let looks = search.looks;
-        self.keep(tip, target, found);
-        looks
+        let interval_count = search.interval_count;
+        self.select_solutions(tip, target, found);
+        interval_count
     }
 
     /// Clamps to the limit, drops what then misses the target and what is there twice, and sorts.
-    fn keep(&self, tip: Tip, target: Point, found: &mut Vec<[f64; 2]>) {
+    fn select_solutions(&self, tip: Tip, target: Point, found: &mut Vec<[f64; 2]>) {
         if target.norm() <= EDGE {
             // Both sections closed circles: every corner of the square of turns.
             found.extend([[TAU, TAU], [TAU, -TAU], [-TAU, TAU], [-TAU, -TAU]]);
@@ -88,7 +101,7 @@ impl TwoSections {
             if turns.iter().all(|turn| turn.abs() <= limit) {
                 return true;
             }
-            *turns = tip.within(*turns, limit, target);
+            *turns = tip.clamp_to_limit(*turns, limit, target);
             (tip.at(*turns).0 - target).norm() <= 5.0 * EDGE
         });
         let mut kept = 0;

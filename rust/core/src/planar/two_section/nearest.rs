@@ -2,7 +2,7 @@
 
 use super::TwoSections;
 use crate::planar::chord::Point;
-use crate::planar::tip_equations::{Problem, Work};
+use crate::planar::tip_equations::{Scratch, TipEquations};
 
 /// Turns per section of the grid that the search starts from.
 const GRID: usize = 41;
@@ -17,6 +17,7 @@ impl TwoSections {
     /// local minima of the distance that a grid of 41 x 41 turns leads to.
     #[must_use]
     pub fn nearest(&self, x: f64, y: f64) -> ([f64; 2], f64) {
+        // A target within reach: its solution of least bending energy.
         let mut found = Vec::new();
         self.solutions(x, y, &mut found);
         if let Some(&turns) = found.first() {
@@ -26,7 +27,7 @@ impl TwoSections {
         let ([l1, l2], limit) = (self.lengths(), self.limit());
         let whole = l1 + l2;
         let distance = x.hypot(y);
-        // Halves: the distance itself may overflow.
+        // A far target: another one in its direction. Halves, since the distance itself may overflow.
         if distance > FAR * whole {
             let half = (0.5 * x).hypot(0.5 * y);
             let part = |c: f64| 0.5 * c / half * FAR * whole;
@@ -34,7 +35,8 @@ impl TwoSections {
             let tip = self.tip(turns);
             return (turns, (tip.x - x).hypot(tip.y - y));
         }
-        let problem = Problem {
+        // Else Newton's method from the local minima of the distance on the grid.
+        let problem = TipEquations {
             lengths: vec![l1 / whole, l2 / whole],
             limits: vec![limit; 2],
             target: Point::new(x / whole, y / whole),
@@ -46,11 +48,12 @@ impl TwoSections {
             let tip = self.tip([turn(i / GRID), turn(i % GRID)]);
             distances.push((tip.x - x).hypot(tip.y - y));
         }
+        // The best of the minima that these lead to.
         let mut best = ([0.0; 2], f64::INFINITY);
-        let mut work = Work::default();
+        let mut work = Scratch::default();
         for start in minima(&distances) {
             let mut turns = vec![turn(start / GRID), turn(start % GRID)];
-            let (miss, _) = problem.approach(&mut turns, &mut work);
+            let (miss, _) = problem.minimize_miss(&mut turns, &mut work);
             if miss * whole < best.1 {
                 best = ([turns[0], turns[1]], miss * whole);
             }

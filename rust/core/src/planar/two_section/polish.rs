@@ -25,7 +25,7 @@ impl Tip {
     }
 
     /// Plain Newton steps, for where their convergence is certain although the miss may grow at first.
-    pub(super) fn settle(&self, mut turns: [f64; 2], target: Point) -> ([f64; 2], f64) {
+    pub(super) fn plain_newton(&self, mut turns: [f64; 2], target: Point) -> ([f64; 2], f64) {
         for _ in 0..CERTAIN {
             let (tip, by_first, by_second) = self.at(turns);
             let step = least_step(by_first, by_second, tip - target);
@@ -39,7 +39,7 @@ impl Tip {
 
     /// Turns beyond the limit brought to it, and the other one, if it is not, to where that costs
     /// least.
-    pub(super) fn within(&self, turns: [f64; 2], limit: f64, target: Point) -> [f64; 2] {
+    pub(super) fn clamp_to_limit(&self, turns: [f64; 2], limit: f64, target: Point) -> [f64; 2] {
         let mut held = turns.map(|turn| turn.clamp(-limit, limit));
         for _ in 0..2 {
             let (tip, by_first, by_second) = self.at(held);

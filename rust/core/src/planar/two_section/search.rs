@@ -4,7 +4,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::equation::{Bounds, Equation, Holds, Level, judge};
+use super::equation::{Bounds, Equation, EquationValue, RootCount, count_roots};
 use super::polish::Tip;
 use super::table::{FIRST, Node, ROOTS, level_start, nodes};
 use crate::planar::chord::{Point, cross};
@@ -32,7 +32,7 @@ pub(super) const SAME: f64 = 1e-8;
 /// Steps of a safeguarded Newton iteration; halving alone would end it.
 const STEPS: usize = 60;
 
-/// Intervals looked at before halving ends whatever is left: a guard, far above what any target of the
+/// Intervals examined before halving stops: a guard, far above what any target of the
 /// tests takes.
 const MOST: usize = 100_000;
 
@@ -40,7 +40,7 @@ const MOST: usize = 100_000;
 const DEPTH: usize = 48;
 
 /// A monotone stretch: where it is, and the angle on it.
-struct Stretch {
+struct MonotoneInterval {
     middle: f64,
     half: f64,
     /// Angle in the middle, its rate, and how far it goes from there at most.
@@ -64,8 +64,8 @@ pub(super) struct Search<'a> {
     pub(super) target: Point,
     /// The turns found, in the order of the first.
     pub(super) found: &'a mut Vec<[f64; 2]>,
-    /// Equations looked at, for the record.
-    pub(super) looks: usize,
+    /// Intervals examined so far.
+    pub(super) interval_count: usize,
 }
 
 impl Search<'_> {
@@ -80,11 +80,11 @@ impl Search<'_> {
             while top > 0 {
                 top -= 1;
                 let Interval { level, index, turn, half } = stack[top];
-                let settled = match level_start(level) {
+                let decided = match level_start(level) {
                     Some(start) => self.examine(&table[start + index], half),
                     None => self.examine(&Node::new(turn), half),
                 };
-                if !settled && level < DEPTH && self.looks < MOST {
+                if !decided && level < DEPTH && self.interval_count < MOST {
                     let (level, half) = (level + 1, 0.5 * half);
                     // The left half on top: roots come in order.
                     stack[top] = Interval { level, index: 2 * index + 1, turn: turn + half, half };
@@ -97,7 +97,7 @@ impl Search<'_> {
 
     /// Notes the roots in the interval of half-width `half` about a node; false if it must be halved.
     fn examine(&mut self, node: &Node, half: f64) -> bool {
-        self.looks += 1;
+        self.interval_count += 1;
         let (l1, l2) = (self.tip.l1, self.tip.l2);
         let to = self.target * node.back - node.chord * l1;
         let distance = to.norm_sqr().sqrt();
@@ -110,11 +110,11 @@ impl Search<'_> {
         let least = distance - moves;
         if least < 0.5 * distance {
             // The joint may reach the target, where the angle has no meaning.
-            return self.closed(node, distance + moves, half);
+            return self.closed_circle(node, distance + moves, half);
         }
         let equation = Equation::new(l1, node, to, distance);
         let bounds = Bounds::new(&equation, [l1, l2], [l1 * node.first_norm, second], least, half);
-        let (bend, sweep) = (|value: &Level| bounds.bend(value, half), bounds.sweep);
+        let (bend, sweep) = (|value: &EquationValue| bounds.bend(value, half), bounds.sweep);
         if sweep > 1.5 {
             return false;
         }
@@ -123,22 +123,22 @@ impl Search<'_> {
         let over = TAU.copysign(-equation.angle) + equation.angle;
         let both = equation.angle.abs() + sweep >= PI;
         let margin = self.margin(distance);
-        let mut kinds = [(equation.angle, Holds::None), (over, Holds::None)];
+        let mut kinds = [(equation.angle, RootCount::None), (over, RootCount::None)];
         let mut values = [equation.value(l2, equation.angle); 2];
-        for (k, (angle, holds)) in kinds.iter_mut().enumerate().take(1 + usize::from(both)) {
+        for (k, (angle, count)) in kinds.iter_mut().enumerate().take(1 + usize::from(both)) {
             values[k] = equation.value(l2, *angle);
-            *holds = judge(&values[k], bend(&values[k]), half, margin);
-            if *holds == Holds::Unknown {
+            *count = count_roots(&values[k], bend(&values[k]), half, margin);
+            if *count == RootCount::Unknown {
                 return false;
             }
         }
         let rate = equation.angle_rate[0];
-        for ((angle, holds), value) in kinds.into_iter().zip(values) {
-            let stretch = Stretch { middle: node.turn, half, angle, rate, sweep };
-            match holds {
-                Holds::One => self.descend(&stretch, &value),
-                Holds::Touch => self.tangent(&stretch),
-                Holds::None | Holds::Unknown => {}
+        for ((angle, count), value) in kinds.into_iter().zip(values) {
+            let interval = MonotoneInterval { middle: node.turn, half, angle, rate, sweep };
+            match count {
+                RootCount::One => self.descend(&interval, &value),
+                RootCount::Touch => self.tangent(&interval),
+                RootCount::None | RootCount::Unknown => {}
             }
         }
         true
@@ -154,8 +154,8 @@ impl Search<'_> {
     }
 
     /// The one root of a monotone stretch, if it has one.
-    fn descend(&mut self, stretch: &Stretch, value: &Level) {
-        let &Stretch { middle, half, angle, rate, sweep } = stretch;
+    fn descend(&mut self, interval: &MonotoneInterval, value: &EquationValue) {
+        let &MonotoneInterval { middle, half, angle, rate, sweep } = interval;
         let step = (-value.value / value.slope).clamp(-half, half);
         // The whole system from the step of the scalar equation: whatever it finds in the stretch is
         // the root.
@@ -170,8 +170,8 @@ impl Search<'_> {
         }
     }
 
-    /// The same by Newton's method between brackets.
-    fn bracket(&mut self, middle: f64, half: f64, reference: f64, value: &Level) {
+    /// Root of a monotone interval by Newton's method between brackets.
+    fn bracket(&mut self, middle: f64, half: f64, reference: f64, value: &EquationValue) {
         let (mut low, mut high) = (middle - half, middle + half);
         let mut turn = (middle - value.value / value.slope).clamp(low, high);
         for _ in 0..STEPS {
@@ -180,7 +180,10 @@ impl Search<'_> {
             let next = turn - at.value / at.slope;
             let near = (next - turn).abs() < 1e-7;
             if near && (low..=high).contains(&next) {
-                self.note([next, 2.0 * angle + 2.0 * equation.angle_rate[0] * (next - turn)]);
+                self.keep_polished([
+                    next,
+                    2.0 * angle + 2.0 * equation.angle_rate[0] * (next - turn),
+                ]);
                 return;
             }
             if (at.value < 0.0) == (at.slope < 0.0) {
@@ -191,7 +194,7 @@ impl Search<'_> {
             if high - low < 1e-9 * half {
                 // The root is beyond the end, unless it is on it.
                 if near {
-                    self.note([turn, 2.0 * angle]);
+                    self.keep_polished([turn, 2.0 * angle]);
                 }
                 return;
             }
@@ -205,7 +208,7 @@ impl Search<'_> {
     /// A stretch on which the joint comes within `reach` of the target: the second section is all but
     /// a closed circle, turned by nearly 2 pi to the one side or the other. When the derivative of
     /// the tip varies little over all such turns, each side holds one solution at most.
-    fn closed(&mut self, node: &Node, reach: f64, half: f64) -> bool {
+    fn closed_circle(&mut self, node: &Node, reach: f64, half: f64) -> bool {
         let Tip { l1, l2 } = self.tip;
         // |e(b)| >= (2 pi - |b|)/(2 pi).
         let short = TAU * reach / l2;
@@ -221,12 +224,12 @@ impl Search<'_> {
             if reach > NARROW && half > NARROW {
                 return false;
             }
-            self.note([node.turn, TAU]);
-            self.note([node.turn, -TAU]);
+            self.keep_polished([node.turn, TAU]);
+            self.keep_polished([node.turn, -TAU]);
             return true;
         }
         for side in [TAU, -TAU] {
-            let (turns, miss) = self.tip.settle([node.turn, side], self.target);
+            let (turns, miss) = self.tip.plain_newton([node.turn, side], self.target);
             if miss <= EDGE && (turns[0] - node.turn).abs() <= half * (1.0 + 1e-9) {
                 self.found.push(turns);
             }
@@ -236,21 +239,21 @@ impl Search<'_> {
 
     /// A stretch on which the equation is within rounding of touching zero: to the extremum, and from
     /// there to both roots, or to the one double one.
-    fn tangent(&mut self, stretch: &Stretch) {
-        let mut turn = stretch.middle;
+    fn tangent(&mut self, interval: &MonotoneInterval) {
+        let mut turn = interval.middle;
         for _ in 0..4 {
-            let (equation, angle) = self.equation_at(turn, stretch.angle);
+            let (equation, angle) = self.equation_at(turn, interval.angle);
             let at = equation.value(self.tip.l2, angle);
-            if at.slope.abs() >= at.second.abs() * 16.0 * stretch.half {
-                return self.note([turn, 2.0 * angle]);
+            if at.slope.abs() >= at.second.abs() * 16.0 * interval.half {
+                return self.keep_polished([turn, 2.0 * angle]);
             }
             turn -= at.slope / at.second;
         }
-        let (equation, angle) = self.equation_at(turn, stretch.angle);
+        let (equation, angle) = self.equation_at(turn, interval.angle);
         let at = equation.value(self.tip.l2, angle);
         let rounding = ROUNDING.max(self.margin(equation.distance) - EDGE);
         if -at.value * at.second.signum() < rounding {
-            self.note([turn, 2.0 * angle]);
+            self.keep_polished([turn, 2.0 * angle]);
             if rounding <= ROUNDING {
                 return;
             }
@@ -258,7 +261,7 @@ impl Search<'_> {
         // Where the equation is coarse, the tip itself tells from either side whether there are two.
         let apart = (2.0 * at.value.abs().max(rounding) / at.second.abs()).sqrt();
         for step in [-apart, apart] {
-            self.note([turn + step, 2.0 * (angle + equation.angle_rate[0] * step)]);
+            self.keep_polished([turn + step, 2.0 * (angle + equation.angle_rate[0] * step)]);
         }
     }
 
@@ -284,8 +287,8 @@ impl Search<'_> {
             for u in even.into_iter().chain([whole - apart, whole + apart]) {
                 let v = (short - l1 * u) / l2;
                 let guess = [s1 * (TAU - u), s2 * (TAU - v)];
-                self.note(guess);
-                let (turns, miss) = self.tip.settle(guess, self.target);
+                self.keep_polished(guess);
+                let (turns, miss) = self.tip.plain_newton(guess, self.target);
                 if miss <= EDGE {
                     self.found.push(turns);
                 }
@@ -294,7 +297,7 @@ impl Search<'_> {
     }
 
     /// Polishes and keeps what hits the target.
-    fn note(&mut self, guess: [f64; 2]) {
+    fn keep_polished(&mut self, guess: [f64; 2]) {
         let (turns, miss) = self.tip.newton(guess, self.target);
         if miss <= EDGE {
             self.found.push(turns);

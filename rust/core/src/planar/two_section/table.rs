@@ -1,5 +1,5 @@
 //! Arcs at the middles of the intervals that the search meets first: they depend on no trunk and no
-//! target, so they are worked out once.
+//! target, so they are computed once.
 
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
@@ -15,7 +15,7 @@ const LEVELS: usize = 5;
 /// Half-width of a first interval \[rad\].
 pub(super) const FIRST: f64 = TAU / ROOTS as f64;
 
-/// What the search needs of the first section at a turn, seen in the frame at its end.
+/// First section at a turn, seen in the frame at its end.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     /// The turn \[rad\].

@@ -14,7 +14,7 @@ use crate::rod::model::{Rod, read_state};
 use crate::rod::newton_system::{Chain, JUMP};
 use crate::rod::plan::Plan;
 use crate::rod::tip_rates::{Solved, Sweep};
-use crate::solve::quadratic_program::dot;
+use crate::solve::dense::dot;
 
 /// Equilibrium that is near enough: its square is below every tolerance \[rad of the own stiffness\].
 const BALANCED: f64 = 1e-6;

@@ -17,8 +17,8 @@ use super::settings::TendonRule;
 use super::subsegment::{Local, Piece};
 use super::tip_rates::{Solved, Sweep};
 use crate::lie::Pose;
+use crate::solve::dense::{backward, dot, forward};
 use crate::solve::pseudo_inverse::PseudoInverse;
-use crate::solve::quadratic_program::{backward, dot, forward};
 
 /// A change of what a rod is made of, or a gradient by it.
 #[derive(Clone, Debug, PartialEq)]

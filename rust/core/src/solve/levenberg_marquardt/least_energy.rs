@@ -7,7 +7,8 @@
 
 use super::{Ending, Problem, Purpose, Scratch};
 use crate::solve::convex_region::Region;
-use crate::solve::quadratic_program::{Outcome, Quadratic, Rows, dot};
+use crate::solve::dense::dot;
+use crate::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
 use nalgebra::SVector;
 
 /// No step moves an unknown further.
@@ -30,68 +31,80 @@ const ROUNDING: f64 = 1e-14;
 
 /// Buffers of a descent of the energy.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Least {
+pub(super) struct LeastEnergy {
     energy: f64,
     gradient: Vec<f64>,
     next: Vec<f64>,
     next_gradient: Vec<f64>,
-    program: Quadratic,
+    program: QuadraticProgram,
     rows: Rows,
 }
 
 impl<const R: usize> Scratch<R> {
     /// Lowers the energy from `z`, which meets the target: [`Ending::Met`] at a minimum. `z` meets the
     /// target at any ending.
-    pub fn lower_energy<P: Problem<R>>(
+    pub fn minimize_energy<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
         z: &mut Vec<f64>,
         max_iterations: usize,
     ) -> Ending {
-        let mut least = std::mem::take(&mut self.least);
-        let ending = self.lower(problem, region, z, max_iterations, &mut least);
-        self.least = least;
+        let mut scratch = std::mem::take(&mut self.least_energy);
+        let ending = self.descend_energy(problem, region, z, max_iterations, &mut scratch);
+        self.least_energy = scratch;
         ending
     }
 
-    fn lower<P: Problem<R>>(
+    fn descend_energy<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
         z: &mut Vec<f64>,
         max_iterations: usize,
-        least: &mut Least,
+        scratch: &mut LeastEnergy,
     ) -> Ending {
-        least.gradient.resize(region.size(), 0.0);
-        least.next_gradient.resize(region.size(), 0.0);
-        least.energy = problem.energy(z, &mut least.gradient);
-        let mut pull = SVector::<f64, R>::zeros();
+        // E and its gradient g at a point with r = 0; λ = 0 to begin with.
+        scratch.gradient.resize(region.size(), 0.0);
+        scratch.next_gradient.resize(region.size(), 0.0);
+        scratch.energy = problem.energy(z, &mut scratch.gradient);
+        let mut multipliers = SVector::<f64, R>::zeros();
         let mut damping = 0.0;
         self.program.active.clear();
         problem.evaluate(z, &mut self.residual, &mut self.jacobian);
         for _ in 0..max_iterations {
+            // Quadratic model of the Lagrangian E + λ·r under the linearised target and region.
             self.iterations += 1;
-            match self.energy_model(problem, region, z, &least.gradient, &pull, &mut damping) {
+            match self.solve_energy_model(
+                problem,
+                region,
+                z,
+                &scratch.gradient,
+                &multipliers,
+                &mut damping,
+            ) {
                 Outcome::Solved => {}
                 // Bounds and target agree at this point alone: there is no freedom to spend.
-                Outcome::Infeasible if problem.met(&self.residual) => return Ending::Met,
+                Outcome::Infeasible if problem.is_met(&self.residual) => return Ending::Met,
                 Outcome::Infeasible | Outcome::Failed => return Ending::Failed,
             }
-            pull.fill(0.0);
+            // λ of the target: the multipliers of the first R rows.
+            multipliers.fill(0.0);
             for (&row, multiplier) in self.program.active.iter().zip(&self.program.multipliers) {
                 if row < R {
-                    pull[row] = *multiplier;
+                    multipliers[row] = *multiplier;
                 }
             }
-            // Strong multipliers carry the rounding of what they multiply.
+            // A minimum has no gradient of the Lagrangian left. Strong multipliers carry the rounding of what they
+            // multiply.
             let strongest =
                 self.program.multipliers.iter().fold(1.0_f64, |most, m| most.max(m.abs()));
             let known = STATIONARY.max(problem.precision());
             if self.program.lagrangian_gradient(&self.rows) <= known * strongest {
                 return Ending::Met;
             }
-            if self.step_down(problem, region, z, &pull, ROUNDING * strongest, least) {
+            // A shorter step along the target, or more damping where none lowers E.
+            if self.line_search(problem, region, z, &multipliers, ROUNDING * strongest, scratch) {
                 damping = if damping < DAMPING.0 { 0.0 } else { 0.6 * damping };
             } else {
                 problem.evaluate(z, &mut self.residual, &mut self.jacobian);
@@ -106,16 +119,16 @@ impl<const R: usize> Scratch<R> {
 
     /// Takes a share of the model's step that lowers the energy, if there is one; the new point has then
     /// been evaluated.
-    fn step_down<P: Problem<R>>(
+    fn line_search<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
         z: &mut Vec<f64>,
-        pull: &SVector<f64, R>,
+        multipliers: &SVector<f64, R>,
         rounding: f64,
-        least: &mut Least,
+        scratch: &mut LeastEnergy,
     ) -> bool {
-        let Least { energy, gradient, next, next_gradient, program, rows } = least;
+        let LeastEnergy { energy, gradient, next, next_gradient, program, rows } = scratch;
         // The active rows are still needed for the next model: the way back has its own program.
         std::mem::swap(&mut self.program, program);
         std::mem::swap(&mut self.rows, rows);
@@ -123,17 +136,19 @@ impl<const R: usize> Scratch<R> {
         let longest = step.iter().fold(0.0_f64, |most, p| most.max(p.abs()));
         let mut share = if longest > STEP { STEP / longest } else { 1.0 };
         // Residuals within the tolerance are worth this much energy.
-        let merit = *energy + pull.dot(&self.residual);
+        let lagrangian = *energy + multipliers.dot(&self.residual);
         let mut lower = None;
         for _ in 0..BACKTRACKS {
+            // A share of the step, brought back into the region and onto the target.
             next.clear();
             next.extend(z.iter().zip(step).map(|(z, p)| z + share * p));
             let wanted = ARMIJO * share * dot(gradient, step).abs();
-            if region.restore(next, &mut self.inside)
+            if region.restore(next, &mut self.restoring)
                 && self.descend(problem, region, next, Purpose::Meet, CORRECTIONS) == Ending::Met
             {
+                // Armijo's condition on E + λ·r.
                 let reached = problem.energy(next, next_gradient);
-                if reached + pull.dot(&self.residual) <= merit - wanted + rounding {
+                if reached + multipliers.dot(&self.residual) <= lagrangian - wanted + rounding {
                     lower = Some(reached);
                     break;
                 }
@@ -151,21 +166,23 @@ impl<const R: usize> Scratch<R> {
 
     /// Minimises the model of the Lagrangian under the linearised target (the first `R` rows) and region;
     /// raises the damping until the model is convex where the target leaves freedom.
-    fn energy_model<P: Problem<R>>(
+    fn solve_energy_model<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
         z: &[f64],
         gradient: &[f64],
-        pull: &SVector<f64, R>,
+        multipliers: &SVector<f64, R>,
         damping: &mut f64,
     ) -> Outcome {
+        // Hessian of the Lagrangian: of E, of λ·r, of the active discs.
         let size = region.size();
         self.hessian.clear();
         self.hessian.resize(size * size, 0.0);
         problem.add_energy_hessian(z, &mut self.hessian);
-        problem.add_hessian(z, pull, &mut self.hessian);
+        problem.add_hessian(z, multipliers, &mut self.hessian);
         region.add_curvature(z, &self.program, R, &mut self.hessian);
+        // Rows: J p = −r of the target, then those of the region and of the problem's bounds.
         self.rows.clear();
         for row in 0..R {
             let normal = self.rows.push(size, -self.residual[row]);
@@ -174,7 +191,8 @@ impl<const R: usize> Scratch<R> {
         self.rows.equalities = R;
         region.linearize(z, &mut self.rows);
         problem.linearize(&mut self.rows);
-        self.stiffen(size, R);
+        self.penalize_rows(size, R);
+        // Damping until the model is positive definite across these rows.
         let mut added = 0.0;
         loop {
             let shift = damping.max(FLOOR);

@@ -11,11 +11,48 @@ mod least_energy;
 
 use nalgebra::SVector;
 
-use crate::solve::convex_region::{Region, Restoring};
-use crate::solve::quadratic_program::{Outcome, Quadratic, Rows, dot};
-use least_energy::Least;
+use crate::solve::convex_region::{Region, RestoreScratch};
+use crate::solve::dense::dot;
+use crate::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
+use least_energy::LeastEnergy;
 
 /// Residuals of `R` rows, and an energy that chooses among the points where they vanish.
+///
+/// ```
+/// use nalgebra::Vector1;
+/// use tdcr::solve::convex_region::Region;
+/// use tdcr::solve::levenberg_marquardt::{Ending, Problem, Purpose, Scratch};
+///
+/// /// The circle of radius 1, and the energy z_0 on it.
+/// struct Circle;
+///
+/// impl Problem<1> for Circle {
+///     fn evaluate(&mut self, z: &[f64], r: &mut Vector1<f64>, jacobian: &mut [Vector1<f64>]) {
+///         r[0] = z[0] * z[0] + z[1] * z[1] - 1.0;
+///         jacobian.iter_mut().zip(z).for_each(|(column, z)| column[0] = 2.0 * z);
+///     }
+///     fn squared_norm(&mut self, z: &[f64]) -> f64 {
+///         (z[0] * z[0] + z[1] * z[1] - 1.0).powi(2)
+///     }
+///     fn is_met(&self, r: &Vector1<f64>) -> bool {
+///         r[0].abs() < 1e-12
+///     }
+///     fn add_hessian(&mut self, _: &[f64], weights: &Vector1<f64>, hessian: &mut [f64]) {
+///         hessian[0] += 2.0 * weights[0];
+///         hessian[3] += 2.0 * weights[0];
+///     }
+///     fn energy(&self, z: &[f64], gradient: &mut [f64]) -> f64 {
+///         gradient.copy_from_slice(&[1.0, 0.0]);
+///         z[0]
+///     }
+///     fn add_energy_hessian(&self, _: &[f64], _: &mut [f64]) {}
+/// }
+///
+/// let (mut scratch, region, mut z) = (Scratch::<1>::default(), Region::new(2), vec![2.0, 1.0]);
+/// let ending = scratch.descend(&mut Circle, &region, &mut z, Purpose::Meet, 50);
+/// assert_eq!(ending, Ending::Met);
+/// assert!((z[0].hypot(z[1]) - 1.0).abs() < 1e-12);
+/// ```
 pub trait Problem<const R: usize> {
     /// Residuals, and their derivatives by every unknown.
     fn evaluate(
@@ -26,30 +63,30 @@ pub trait Problem<const R: usize> {
     );
 
     /// The squared residuals alone.
-    fn squared(&mut self, z: &[f64]) -> f64;
+    fn squared_norm(&mut self, z: &[f64]) -> f64;
 
-    /// Whether residuals are as small as wanted.
-    fn met(&self, residual: &SVector<f64, R>) -> bool;
+    /// True when residuals are within the tolerances.
+    fn is_met(&self, residual: &SVector<f64, R>) -> bool;
 
     /// Adds the second derivatives of `weights . r` to the lower triangle of a matrix, row by row, at `z`,
     /// the point evaluated last.
     fn add_hessian(&mut self, z: &[f64], weights: &SVector<f64, R>, hessian: &mut [f64]);
 
-    /// Forgets where it was, for problems whose values depend on that: what follows begins anew.
+    /// Resets a problem whose values depend on the points before.
     fn restart(&mut self) {}
 
-    /// Keeps where it is, for [`Self::go_back`].
-    fn keep(&mut self) {}
+    /// Saves the state of the point evaluated last, for [`Self::restore_state`].
+    fn save_state(&mut self) {}
 
-    /// Back to where it was kept.
-    fn go_back(&mut self) {}
+    /// Restores the saved state.
+    fn restore_state(&mut self) {}
 
     /// Adds bounds on functions of the unknowns, as rows for a step from the point evaluated last; there are
     /// none unless this is defined.
     fn linearize(&self, _rows: &mut Rows) {}
 
-    /// Whether there are any.
-    fn bounded(&self) -> bool {
+    /// True when there are bounds on functions of the unknowns.
+    fn has_bounds(&self) -> bool {
         false
     }
 
@@ -71,9 +108,16 @@ pub trait Problem<const R: usize> {
 }
 
 /// Why an iteration ended.
+///
+/// ```
+/// use tdcr::solve::levenberg_marquardt::Ending;
+///
+/// let retry = |ending| matches!(ending, Ending::Stalled | Ending::IterationLimit);
+/// assert!(retry(Ending::Stalled) && !retry(Ending::Met));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// The residuals are as small as wanted.
+    /// The residuals are within the tolerances.
     Met,
     /// At, or on the way to, a minimum that does not meet them.
     Stalled,
@@ -83,7 +127,14 @@ pub enum Ending {
     Failed,
 }
 
-/// What a descent is for.
+/// Purpose of a descent.
+///
+/// ```
+/// use tdcr::solve::levenberg_marquardt::Purpose;
+///
+/// let purpose = |last_start: bool| if last_start { Purpose::Nearest } else { Purpose::Meet };
+/// assert_eq!(purpose(true), Purpose::Nearest);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// To meet the residuals, or to give up early so that another start gets its turn.
@@ -98,7 +149,7 @@ const STEP: f64 = 1.0;
 const DAMPING: f64 = 0.1;
 /// Damping at least, as a share of the trace: rounding in a singular matrix is below it.
 const FLOOR: f64 = 1e-13;
-/// Damping beyond which no step is left.
+/// Damping beyond which steps vanish.
 const STUCK: f64 = 1e12;
 /// A step that lowers the squared residual by less than this share makes no headway...
 const HEADWAY: f64 = 1e-3;
@@ -118,6 +169,17 @@ const STATIONARY: f64 = 1e-11;
 const ROUNDING: f64 = 1e-15;
 
 /// Buffers, reused from one descent to the next.
+///
+/// ```
+/// use tdcr::solve::convex_region::Region;
+/// use tdcr::solve::levenberg_marquardt::Scratch;
+///
+/// let mut region = Region::new(2);
+/// region.add_bound(&[1.0, 0.0], 1.0);
+/// let (mut scratch, mut start) = (Scratch::<6>::default(), [3.0, 0.0]);
+/// assert!(scratch.restore(&region, &mut start));
+/// assert!(region.contains(&start));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scratch<const R: usize> {
     /// Steps taken so far, for the caller to reset.
@@ -125,16 +187,16 @@ pub struct Scratch<const R: usize> {
     /// Residuals at the last point.
     pub residual: SVector<f64, R>,
     pub(super) jacobian: Vec<SVector<f64, R>>,
-    pub(super) program: Quadratic,
+    pub(super) program: QuadraticProgram,
     pub(super) rows: Rows,
     pub(super) hessian: Vec<f64>,
     pub(super) trial: Vec<f64>,
     trial_residual: SVector<f64, R>,
     trial_jacobian: Vec<SVector<f64, R>>,
-    /// Of the programs that bring points back: the active rows of the last model are still needed.
-    pub(super) inside: Restoring,
-    least: Least,
-    /// Rows along which no step is wanted, orthonormal.
+    /// Buffers of the programs that bring points back: the active rows of the last model are still needed.
+    pub(super) restoring: RestoreScratch,
+    least_energy: LeastEnergy,
+    /// Orthonormal basis of the rows across which steps are to stay.
     basis: Vec<f64>,
 }
 
@@ -144,14 +206,14 @@ impl<const R: usize> Default for Scratch<R> {
             iterations: 0,
             residual: SVector::zeros(),
             jacobian: Vec::new(),
-            program: Quadratic::default(),
+            program: QuadraticProgram::default(),
             rows: Rows::default(),
             hessian: Vec::new(),
             trial: Vec::new(),
             trial_residual: SVector::zeros(),
             trial_jacobian: Vec::new(),
-            inside: Restoring::default(),
-            least: Least::default(),
+            restoring: RestoreScratch::default(),
+            least_energy: LeastEnergy::default(),
             basis: Vec::new(),
         }
     }
@@ -160,7 +222,7 @@ impl<const R: usize> Default for Scratch<R> {
 impl<const R: usize> Scratch<R> {
     /// Brings a point into the region; false when the region is empty as far as this can tell.
     pub fn restore(&mut self, region: &Region, z: &mut [f64]) -> bool {
-        region.restore(z, &mut self.inside)
+        region.restore(z, &mut self.restoring)
     }
 
     /// Evaluates the problem at a point.
@@ -178,11 +240,12 @@ impl<const R: usize> Scratch<R> {
         purpose: Purpose,
         max_iterations: usize,
     ) -> Ending {
+        // r and J at the start, brought inside the problem's own bounds.
         self.trial_jacobian.resize(region.size(), SVector::zeros());
         self.evaluate(problem, z);
         if problem.violation() > WITHIN {
             let (mut residual, mut jacobian) = (self.residual, std::mem::take(&mut self.jacobian));
-            let inside = self.come_back(problem, region, z, &mut residual, &mut jacobian);
+            let inside = self.return_inside(problem, region, z, &mut residual, &mut jacobian);
             (self.residual, self.jacobian) = (residual, jacobian);
             if !inside {
                 return Ending::Failed;
@@ -192,42 +255,45 @@ impl<const R: usize> Scratch<R> {
         let (mut damping, mut idle) = (DAMPING, 0);
         self.program.active.clear();
         for _ in 0..max_iterations {
-            if problem.met(&self.residual) {
+            if problem.is_met(&self.residual) {
                 return Ending::Met;
             }
             if !squared.is_finite() {
                 return Ending::Failed;
             }
+            // Step p of the damped model, ½|r + J p|² + ½ μ|p|² under the region's rows.
             self.iterations += 1;
-            if !self.model(problem, region, z, purpose, &mut damping) {
+            if !self.solve_model(problem, region, z, purpose, &mut damping) {
                 return Ending::Failed;
             }
             if purpose == Purpose::Nearest && self.stationary(squared, problem.precision()) {
                 return Ending::Stalled;
             }
-            let lower = self.accept(problem, region, z, squared);
+            // A step that lowers |r|² is taken and lowers μ; another one raises μ.
+            let lower = self.try_step(problem, region, z, squared);
             if let Some(lower) = lower {
                 idle = if lower > (1.0 - HEADWAY) * squared { idle + 1 } else { 0 };
                 squared = lower;
                 damping *= 0.2;
             } else {
                 damping = (8.0 * damping).max(1e-9);
-                if purpose == Purpose::Nearest || problem.bounded() {
+                if purpose == Purpose::Nearest || problem.has_bounds() {
                     // Second derivatives and bounds are those of the point evaluated last.
                     self.evaluate(problem, z);
                 }
             }
+            // Without headway the next start gets its turn.
             let stuck = damping > STUCK || (purpose == Purpose::Meet && idle > PATIENCE);
             if stuck {
                 return Ending::Stalled;
             }
         }
-        if problem.met(&self.residual) { Ending::Met } else { Ending::IterationLimit }
+        if problem.is_met(&self.residual) { Ending::Met } else { Ending::IterationLimit }
     }
 
     /// Minimises the damped model under the linearised constraints; raises the damping until the model is
     /// convex.
-    fn model<P: Problem<R>>(
+    fn solve_model<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
@@ -235,6 +301,7 @@ impl<const R: usize> Scratch<R> {
         purpose: Purpose,
         damping: &mut f64,
     ) -> bool {
+        // JᵀJ and Jᵀr; the nearest point needs the second derivatives of r and of the discs too.
         let size = region.size();
         self.gauss_newton(size);
         let trace: f64 = (0..size).map(|i| self.hessian[i * (size + 1)]).sum();
@@ -244,8 +311,9 @@ impl<const R: usize> Scratch<R> {
             self.rows.clear();
             region.linearize(z, &mut self.rows);
             problem.linearize(&mut self.rows);
-            self.stiffen(size, 0);
+            self.penalize_rows(size, 0);
         }
+        // Damping μ in proportion to |r|², raised until the matrix is positive definite.
         let squared = self.residual.norm_squared();
         let mut added = 0.0;
         loop {
@@ -262,14 +330,16 @@ impl<const R: usize> Scratch<R> {
                 return false;
             }
         }
+        // The free minimum, where the region and the bounds allow it.
         self.program.solve_free();
         self.trial.clear();
         self.trial.extend(z.iter().zip(&self.program.step).map(|(z, p)| z + p));
         // A point inside satisfies every tangent too.
         let inside = region.contains(&self.trial);
-        if inside && !problem.bounded() {
+        if inside && !problem.has_bounds() {
             return true;
         }
+        // Else the minimum under the linearised constraints.
         self.rows.clear();
         region.linearize(z, &mut self.rows);
         problem.linearize(&mut self.rows);
@@ -294,7 +364,7 @@ impl<const R: usize> Scratch<R> {
 
     /// Adds the square of the projection onto the first `fixed` rows and those that were active last: no
     /// step along them is wanted, so that only curvature across them has to be positive.
-    pub(super) fn stiffen(&mut self, size: usize, fixed: usize) {
+    pub(super) fn penalize_rows(&mut self, size: usize, fixed: usize) {
         self.basis.clear();
         let active = self.program.active.iter().copied().filter(|row| *row >= fixed);
         for row in (0..fixed).chain(active) {
@@ -329,7 +399,7 @@ impl<const R: usize> Scratch<R> {
         }
     }
 
-    /// Whether the gradient of the Lagrangian vanishes.
+    /// True when the gradient of the Lagrangian vanishes.
     fn stationary(&self, squared: f64, precision: f64) -> bool {
         let steepest = self.jacobian.iter().fold(0.0_f64, |most, column| most.max(column.norm()));
         let left = self.program.lagrangian_gradient(&self.rows);
@@ -337,7 +407,7 @@ impl<const R: usize> Scratch<R> {
     }
 
     /// Takes the model's step if it lowers the squared residual, which is returned.
-    fn accept<P: Problem<R>>(
+    fn try_step<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
@@ -348,14 +418,15 @@ impl<const R: usize> Scratch<R> {
         let share = if longest > STEP { STEP / longest } else { 1.0 };
         self.trial.clear();
         self.trial.extend(z.iter().zip(&self.program.step).map(|(z, p)| z + share * p));
-        if !region.contains(&self.trial) && !region.restore(&mut self.trial, &mut self.inside) {
+        if !region.contains(&self.trial) && !region.restore(&mut self.trial, &mut self.restoring) {
             return None;
         }
         problem.evaluate(&self.trial, &mut self.trial_residual, &mut self.trial_jacobian);
         if problem.violation() > WITHIN {
             let (mut trial, mut residual) = (std::mem::take(&mut self.trial), self.trial_residual);
             let mut jacobian = std::mem::take(&mut self.trial_jacobian);
-            let inside = self.come_back(problem, region, &mut trial, &mut residual, &mut jacobian);
+            let inside =
+                self.return_inside(problem, region, &mut trial, &mut residual, &mut jacobian);
             (self.trial, self.trial_residual, self.trial_jacobian) = (trial, residual, jacobian);
             if !inside {
                 return None;
@@ -373,7 +444,7 @@ impl<const R: usize> Scratch<R> {
 
     /// Brings a point back inside the problem's own bounds by steps of least length; it is then the one evaluated
     /// last.
-    fn come_back<P: Problem<R>>(
+    fn return_inside<P: Problem<R>>(
         &mut self,
         problem: &mut P,
         region: &Region,
@@ -382,7 +453,7 @@ impl<const R: usize> Scratch<R> {
         jacobian: &mut [SVector<f64, R>],
     ) -> bool {
         for _ in 0..RETURNS {
-            if !region.return_by(z, &mut self.inside, |rows| problem.linearize(rows)) {
+            if !region.restoring_step(z, &mut self.restoring, |rows| problem.linearize(rows)) {
                 return false;
             }
             problem.evaluate(z, residual, jacobian);

@@ -1,11 +1,24 @@
-//! What a swarm minimises: a function of one point, or of the whole swarm at once.
+//! Objectives of a swarm: functions of one point, or of the whole swarm at once.
 
 use std::convert::Infallible;
 
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-/// How far a run has come.
+/// Progress of a run.
+///
+/// ```
+/// use tdcr::solve::pso::{Pointwise, Progress, PsoSettings, Stop, Swarm, Watched};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mut swarm = Swarm::new(PsoSettings::default(), &[-1.0], &[1.0])?;
+/// let objective = Pointwise(|x: &[f64]| x[0] * x[0]);
+/// let watch = |progress: &Progress| progress.iteration == 3;
+/// let Ok(report) = swarm.run(&mut Watched { objective, watch });
+/// assert_eq!((report.stop, report.iterations), (Stop::Callback, 3));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Moves of the whole swarm so far.
@@ -17,8 +30,33 @@ pub struct Progress {
 }
 
 /// A function to minimise over a box.
+///
+/// ```
+/// use std::convert::Infallible;
+/// use tdcr::solve::pso::{Objective, PsoSettings, Swarm};
+///
+/// struct Sphere;
+///
+/// impl Objective for Sphere {
+///     type Error = Infallible;
+///
+///     fn values(&mut self, points: &[f64], n: usize, values: &mut [f64]) -> Result<(), Infallible> {
+///         for (value, point) in values.iter_mut().zip(points.chunks_exact(n)) {
+///             *value = point.iter().map(|x| x * x).sum();
+///         }
+///         Ok(())
+///     }
+/// }
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mut swarm = Swarm::new(PsoSettings::default(), &[-1.0; 3], &[1.0; 3])?;
+/// let Ok(report) = swarm.run(&mut Sphere);
+/// assert!(report.value < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
 pub trait Objective {
-    /// What can go wrong in it; it ends the run and comes back unchanged.
+    /// Error of the objective; it ends the run and comes back unchanged.
     type Error;
 
     /// Writes the value at every point. Points are rows of `dimensions` numbers. NaN is no value:
@@ -43,6 +81,17 @@ pub trait Objective {
 }
 
 /// A function of one point.
+///
+/// ```
+/// use tdcr::solve::pso::{Pointwise, PsoSettings, Swarm};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mut swarm = Swarm::new(PsoSettings::default(), &[-1.0], &[1.0])?;
+/// let Ok(report) = swarm.run(&mut Pointwise(|x: &[f64]| (x[0] - 0.5).abs()));
+/// assert!(report.value < 1e-3);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Pointwise<F>(pub F);
 
@@ -58,7 +107,21 @@ impl<F: FnMut(&[f64]) -> f64> Objective for Pointwise<F> {
     }
 }
 
-/// A function of all points at once, called with points, dimensions and the place for the values.
+/// A function of all points at once, called with points, dimensions and the slice for the values.
+///
+/// ```
+/// use tdcr::solve::pso::{PsoSettings, Swarm, Whole};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mut swarm = Swarm::new(PsoSettings::default(), &[-1.0], &[1.0])?;
+/// let squares = |points: &[f64], _: usize, values: &mut [f64]| {
+///     values.iter_mut().zip(points).for_each(|(value, x)| *value = x * x);
+/// };
+/// let Ok(report) = swarm.run(&mut Whole(squares));
+/// assert!(report.value < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Whole<F>(pub F);
 
@@ -73,6 +136,19 @@ impl<F: FnMut(&[f64], usize, &mut [f64])> Objective for Whole<F> {
 }
 
 /// A function of one point, evaluated on all threads of a pool. The run is the same as on one.
+///
+/// ```
+/// use tdcr::batch::pool;
+/// use tdcr::solve::pso::{Parallel, PsoSettings, Swarm};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mut swarm = Swarm::new(PsoSettings::default(), &[-1.0], &[1.0])?;
+/// let pool = pool(Some(2))?;
+/// let Ok(report) = swarm.run(&mut Parallel { function: |x: &[f64]| x[0] * x[0], pool: &pool });
+/// assert!(report.value < 1e-6);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Parallel<'p, F> {
     /// The function.
@@ -95,9 +171,26 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Objective for Parallel<'_, F> {
 }
 
 /// An objective and who watches it; the watcher ends the run by returning true.
+///
+/// ```
+/// use tdcr::solve::pso::{Pointwise, PsoSettings, Swarm, Watched};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let mut swarm = Swarm::new(PsoSettings::default(), &[-1.0], &[1.0])?;
+/// let mut moves = 0;
+/// let objective = Pointwise(|x: &[f64]| x[0] * x[0]);
+/// let watch = |_: &_| {
+///     moves += 1;
+///     false
+/// };
+/// let Ok(report) = swarm.run(&mut Watched { objective, watch });
+/// assert_eq!(moves, report.iterations + 1);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<O, W> {
-    /// What is minimised.
+    /// Objective to minimise.
     pub objective: O,
     /// Sees every iteration.
     pub watch: W,

@@ -5,41 +5,43 @@
 
 use std::f64::consts::TAU;
 
-use super::random::halves;
+use super::random::uniform_pair;
 use super::settings::{Bounds, PsoSettings, Sampling};
 
 /// Places, velocities, best points and the box, each particles x dimensions.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Cloud {
-    pub(super) places: Vec<f64>,
+pub(super) struct Particles {
+    pub(super) positions: Vec<f64>,
     velocities: Vec<f64>,
-    /// Where each particle was best.
+    /// Best point p of each particle.
     pub(super) own: Vec<f64>,
     /// The best point of each particle's leader.
-    led: Vec<f64>,
+    leader_best: Vec<f64>,
     /// The box and the largest velocity, repeated for every particle.
     lower: Vec<f64>,
     upper: Vec<f64>,
-    fastest: Vec<f64>,
+    velocity_limits: Vec<f64>,
     /// One particle's direction, for the ball.
     direction: Vec<f64>,
     dimensions: usize,
 }
 
-/// How a particle moves, without what the swarm is otherwise.
+/// Coefficients of a particle's move.
 #[derive(Clone, Copy)]
-struct Pulls {
+struct Coefficients {
     inertia: f64,
     cognitive: f64,
     social: f64,
 }
 
-impl Cloud {
+impl Particles {
     /// Sizes the buffers and sets the box.
     pub(super) fn resize(&mut self, settings: &PsoSettings, lower: &[f64], upper: &[f64]) {
         let (n, particles) = (lower.len(), settings.particles);
         self.dimensions = n;
-        for buffer in [&mut self.places, &mut self.velocities, &mut self.own, &mut self.led] {
+        for buffer in
+            [&mut self.positions, &mut self.velocities, &mut self.own, &mut self.leader_best]
+        {
             buffer.resize(particles * n, 0.0);
         }
         for (buffer, bound) in [(&mut self.lower, lower), (&mut self.upper, upper)] {
@@ -48,38 +50,39 @@ impl Cloud {
         }
         // Without a limit, what keeps an unstable swarm's velocities finite.
         let limit = settings.velocity_limit.unwrap_or(1e3);
-        self.fastest.clear();
+        self.velocity_limits.clear();
         let widths = self.lower.iter().zip(&self.upper);
-        self.fastest.extend(widths.map(|(lower, upper)| limit * (upper - lower)));
+        self.velocity_limits.extend(widths.map(|(lower, upper)| limit * (upper - lower)));
         self.direction.resize(n.next_multiple_of(2), 0.0);
     }
 
-    /// Places uniform in the box, velocities to places uniform in it.
-    pub(super) fn scatter(&mut self, draws: &[u64]) {
-        for e in 0..self.places.len() {
-            let (at, to) = halves(draws[e]);
+    /// Positions uniform in the box, velocities to positions uniform in it.
+    pub(super) fn initialize(&mut self, draws: &[u64]) {
+        for e in 0..self.positions.len() {
+            let (at, to) = uniform_pair(draws[e]);
             let (lower, upper) = (self.lower[e], self.upper[e]);
-            let place = held(lower + at * (upper - lower), lower, upper);
-            let fastest = self.fastest[e];
-            self.places[e] = place;
-            self.velocities[e] = held(lower + to * (upper - lower) - place, -fastest, fastest);
+            let place = clamp_to(lower + at * (upper - lower), lower, upper);
+            let velocity_limits = self.velocity_limits[e];
+            self.positions[e] = place;
+            self.velocities[e] =
+                clamp_to(lower + to * (upper - lower) - place, -velocity_limits, velocity_limits);
         }
     }
 
-    /// Whether a number is inside the box, as coordinate `e` of the swarm.
-    pub(super) fn holds(&self, e: usize, x: f64) -> bool {
+    /// True when a number is inside the box, as coordinate `e` of the swarm.
+    pub(super) fn contains(&self, e: usize, x: f64) -> bool {
         (self.lower[e]..=self.upper[e]).contains(&x)
     }
 
-    /// Puts given points in the place of the first particles'.
-    pub(super) fn place(&mut self, points: &[f64]) {
-        self.places[..points.len()].copy_from_slice(points);
+    /// Sets the positions of the first particles.
+    pub(super) fn set_positions(&mut self, points: &[f64]) {
+        self.positions[..points.len()].copy_from_slice(points);
     }
 
-    /// Hands every particle the best point of its leader.
-    pub(super) fn follow(&mut self, leaders: &[usize]) {
+    /// Copies the best point g of its leader to every particle.
+    pub(super) fn update_leaders(&mut self, leaders: &[usize]) {
         let n = self.dimensions;
-        for (row, &leader) in self.led.chunks_exact_mut(n).zip(leaders) {
+        for (row, &leader) in self.leader_best.chunks_exact_mut(n).zip(leaders) {
             let best = &self.own[leader * n..(leader + 1) * n];
             for (place, value) in row.iter_mut().zip(best) {
                 *place = *value;
@@ -87,11 +90,11 @@ impl Cloud {
         }
     }
 
-    /// Where a particle is becomes its best point.
-    pub(super) fn remember(&mut self, particle: usize) {
+    /// Stores a particle's position as its best point.
+    pub(super) fn store_best(&mut self, particle: usize) {
         let row = particle * self.dimensions..(particle + 1) * self.dimensions;
         for e in row {
-            self.own[e] = self.places[e];
+            self.own[e] = self.positions[e];
         }
     }
 
@@ -101,81 +104,97 @@ impl Cloud {
     }
 
     /// Moves every particle once.
-    pub(super) fn sweep(&mut self, settings: &PsoSettings, leaders: &[usize], draws: &[u64]) {
+    pub(super) fn advance(&mut self, settings: &PsoSettings, leaders: &[usize], draws: &[u64]) {
         match settings.bounds {
-            Bounds::Clamp => self.sweep_to(settings, leaders, draws, clamp),
-            Bounds::Reflect => self.sweep_to(settings, leaders, draws, reflect),
-            Bounds::Absorb => self.sweep_to(settings, leaders, draws, absorb),
-            Bounds::Rebound => self.sweep_to(settings, leaders, draws, rebound),
+            Bounds::Clamp => self.advance_within(settings, leaders, draws, clamp),
+            Bounds::Reflect => self.advance_within(settings, leaders, draws, reflect),
+            Bounds::Absorb => self.advance_within(settings, leaders, draws, absorb),
+            Bounds::Rebound => self.advance_within(settings, leaders, draws, rebound),
         }
     }
 
-    fn sweep_to<W>(&mut self, settings: &PsoSettings, leaders: &[usize], draws: &[u64], wall: W)
-    where
+    fn advance_within<W>(
+        &mut self,
+        settings: &PsoSettings,
+        leaders: &[usize],
+        draws: &[u64],
+        wall: W,
+    ) where
         W: Fn(f64, f64, f64, f64) -> (f64, f64),
     {
         let PsoSettings { inertia, cognitive, social, .. } = *settings;
-        let pulls = Pulls { inertia, cognitive, social };
+        let coefficients = Coefficients { inertia, cognitive, social };
         match settings.sampling {
-            Sampling::Box => self.sweep_boxes(pulls, draws, wall),
-            Sampling::Sphere => self.sweep_balls(pulls, leaders, draws, wall),
+            Sampling::Box => self.advance_in_boxes(coefficients, draws, wall),
+            Sampling::Sphere => self.advance_in_balls(coefficients, leaders, draws, wall),
         }
     }
 
     /// `v <- w v + c1 r1 (p - x) + c2 r2 (g - x)`, `x <- x + v`.
-    fn sweep_boxes<W>(&mut self, pulls: Pulls, draws: &[u64], wall: W)
+    fn advance_in_boxes<W>(&mut self, coefficients: Coefficients, draws: &[u64], wall: W)
     where
         W: Fn(f64, f64, f64, f64) -> (f64, f64),
     {
-        let size = self.places.len();
+        let size = self.positions.len();
         // Equal lengths in sight of the loop: no bounds are checked in it, and it runs over vectors.
-        let (places, velocities) = (&mut self.places[..size], &mut self.velocities[..size]);
-        let (own, led, draws) = (&self.own[..size], &self.led[..size], &draws[..size]);
+        let (positions, velocities) = (&mut self.positions[..size], &mut self.velocities[..size]);
+        let (own, leader_best, draws) =
+            (&self.own[..size], &self.leader_best[..size], &draws[..size]);
         let (lower, upper) = (&self.lower[..size], &self.upper[..size]);
-        let fastest = &self.fastest[..size];
+        let velocity_limits = &self.velocity_limits[..size];
         for e in 0..size {
-            let (first, second) = halves(draws[e]);
-            let place = places[e];
-            let velocity = pulls.inertia * velocities[e]
-                + pulls.cognitive * first * (own[e] - place)
-                + pulls.social * second * (led[e] - place);
-            let velocity = held(velocity, -fastest[e], fastest[e]);
-            (places[e], velocities[e]) = wall(place + velocity, velocity, lower[e], upper[e]);
+            let (first, second) = uniform_pair(draws[e]);
+            let place = positions[e];
+            let velocity = coefficients.inertia * velocities[e]
+                + coefficients.cognitive * first * (own[e] - place)
+                + coefficients.social * second * (leader_best[e] - place);
+            let velocity = clamp_to(velocity, -velocity_limits[e], velocity_limits[e]);
+            (positions[e], velocities[e]) = wall(place + velocity, velocity, lower[e], upper[e]);
         }
     }
 
     /// `x'` uniform in direction and distance in the ball around G through x, `v <- w v + x' - x`,
     /// `x <- x + v`. G is the mean of x, `x + c1 (p - x)` and `x + c2 (l - x)`; without the last for a
     /// particle that leads itself.
-    fn sweep_balls<W>(&mut self, pulls: Pulls, leaders: &[usize], draws: &[u64], wall: W)
-    where
+    fn advance_in_balls<W>(
+        &mut self,
+        coefficients: Coefficients,
+        leaders: &[usize],
+        draws: &[u64],
+        wall: W,
+    ) where
         W: Fn(f64, f64, f64, f64) -> (f64, f64),
     {
         let n = self.dimensions;
         for (particle, &leader) in leaders.iter().enumerate() {
             let row = particle * n..(particle + 1) * n;
+            // Weights of p - x and l - x in G - x.
             let (own, social) = if leader == particle {
-                (pulls.cognitive / 2.0, 0.0)
+                (coefficients.cognitive / 2.0, 0.0)
             } else {
-                (pulls.cognitive / 3.0, pulls.social / 3.0)
+                (coefficients.cognitive / 3.0, coefficients.social / 3.0)
             };
-            let towards =
-                |place: f64, best: f64, led: f64| own * (best - place) + social * (led - place);
+            let attraction = |place: f64, best: f64, leader_best: f64| {
+                own * (best - place) + social * (leader_best - place)
+            };
             let radius = (row.clone())
-                .map(|e| towards(self.places[e], self.own[e], self.led[e]).powi(2))
+                .map(|e| attraction(self.positions[e], self.own[e], self.leader_best[e]).powi(2))
                 .sum::<f64>()
                 .sqrt();
+            // Direction d of length one and share u of the radius |G - x|.
             let length = direction(&draws[row.clone()], &mut self.direction);
             // In one dimension only the sign of the direction counts, which is the other half.
-            let (share, _) = halves(draws[row.end - 1]);
+            let (share, _) = uniform_pair(draws[row.end - 1]);
             let distance = if length > 0.0 { share * radius / length } else { 0.0 };
+            // x' - x = G - x + u |G - x| d.
             for (e, along) in row.zip(&self.direction) {
-                let place = self.places[e];
-                let velocity = pulls.inertia * self.velocities[e]
-                    + towards(place, self.own[e], self.led[e])
+                let place = self.positions[e];
+                let velocity = coefficients.inertia * self.velocities[e]
+                    + attraction(place, self.own[e], self.leader_best[e])
                     + distance * along;
-                let velocity = held(velocity, -self.fastest[e], self.fastest[e]);
-                (self.places[e], self.velocities[e]) =
+                let velocity =
+                    clamp_to(velocity, -self.velocity_limits[e], self.velocity_limits[e]);
+                (self.positions[e], self.velocities[e]) =
                     wall(place + velocity, velocity, self.lower[e], self.upper[e]);
             }
         }
@@ -186,7 +205,7 @@ impl Cloud {
 /// two from a draw, and the length of the vector they make: no direction is preferred.
 fn direction(draws: &[u64], out: &mut [f64]) -> f64 {
     for (pair, &draw) in out.chunks_exact_mut(2).zip(draws) {
-        let (first, second) = halves(draw);
+        let (first, second) = uniform_pair(draw);
         let radius = (-2.0 * (1.0 - first).ln()).sqrt();
         let (sine, cosine) = (TAU * second).sin_cos();
         pair.copy_from_slice(&[radius * cosine, radius * sine]);
@@ -196,32 +215,32 @@ fn direction(draws: &[u64], out: &mut [f64]) -> f64 {
 
 /// The nearest number in an interval. Not `clamp`, which panics on an empty one.
 #[inline(always)]
-fn held(x: f64, lower: f64, upper: f64) -> f64 {
+fn clamp_to(x: f64, lower: f64, upper: f64) -> f64 {
     let x = if x < lower { lower } else { x };
     if x > upper { upper } else { x }
 }
 
 #[inline(always)]
 fn clamp(x: f64, v: f64, lower: f64, upper: f64) -> (f64, f64) {
-    (held(x, lower, upper), v)
+    (clamp_to(x, lower, upper), v)
 }
 
 #[inline(always)]
 fn reflect(x: f64, v: f64, lower: f64, upper: f64) -> (f64, f64) {
     let mirrored = if x < lower { 2.0 * lower - x } else { x };
     let mirrored = if x > upper { 2.0 * upper - x } else { mirrored };
-    (held(mirrored, lower, upper), if held(x, lower, upper) == x { v } else { -v })
+    (clamp_to(mirrored, lower, upper), if clamp_to(x, lower, upper) == x { v } else { -v })
 }
 
 #[inline(always)]
 fn absorb(x: f64, v: f64, lower: f64, upper: f64) -> (f64, f64) {
-    let place = held(x, lower, upper);
+    let place = clamp_to(x, lower, upper);
     (place, if place == x { v } else { 0.0 })
 }
 
 #[inline(always)]
 fn rebound(x: f64, v: f64, lower: f64, upper: f64) -> (f64, f64) {
-    let place = held(x, lower, upper);
+    let place = clamp_to(x, lower, upper);
     (place, if place == x { v } else { -0.5 * v })
 }
 
@@ -246,7 +265,7 @@ mod tests {
     /// Directions fill the circle evenly, in any number of dimensions each coordinate alike.
     #[test]
     fn directions_prefer_nothing() {
-        let mut draws = super::super::random::Draws::default();
+        let mut draws = super::super::random::RandomStreams::default();
         draws.resize(1, 3);
         draws.seed(5);
         let (mut mean, mut square) = ([0.0; 3], [0.0; 3]);

@@ -21,7 +21,7 @@ fn stream(seed: u64, particle: u64) -> ChaCha8Core {
 
 /// Two numbers in [0, 1) from the two halves of a draw.
 #[inline(always)]
-pub(super) fn halves(draw: u64) -> (f64, f64) {
+pub(super) fn uniform_pair(draw: u64) -> (f64, f64) {
     // The word becomes the top of a mantissa in [1, 2): shifts that run over vectors, where a
     // conversion of integers would not.
     const ONE: u64 = 1023 << 52;
@@ -33,7 +33,7 @@ pub(super) fn halves(draw: u64) -> (f64, f64) {
 /// One draw of 64 bits per coordinate and step. A particle takes them from a stream of its own, step
 /// after step; they lie step after step for the whole swarm.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Draws {
+pub(super) struct RandomStreams {
     streams: Vec<ChaCha8Core>,
     /// Steps x particles x dimensions.
     ahead: Vec<u64>,
@@ -44,7 +44,7 @@ pub(super) struct Draws {
     used: usize,
 }
 
-impl Draws {
+impl RandomStreams {
     /// Sizes the buffers.
     pub(super) fn resize(&mut self, particles: usize, dimensions: usize) {
         let blocks = (2 * dimensions).div_ceil(BLOCK);
@@ -95,13 +95,13 @@ impl Draws {
 
 /// Whole numbers below a bound, from a stream that belongs to no particle.
 #[derive(Clone, Debug)]
-pub(super) struct Lots {
+pub(super) struct RandomIntegers {
     stream: ChaCha8Core,
     words: [u32; BLOCK],
     used: usize,
 }
 
-impl Lots {
+impl RandomIntegers {
     pub(super) fn new(seed: u64) -> Self {
         Self { stream: stream(seed, u64::MAX), words: [0; BLOCK], used: BLOCK }
     }
@@ -126,10 +126,10 @@ mod tests {
     #[test]
     fn streams_belong_to_particles() {
         for n in [1, 2, 3, 31, 32, 33, 100] {
-            let mut swarm = Draws::default();
+            let mut swarm = RandomStreams::default();
             swarm.resize(5, n);
             swarm.seed(7);
-            let mut alone = Draws::default();
+            let mut alone = RandomStreams::default();
             alone.resize(1, n);
             alone.seed(7);
             for _ in 0..50 {
@@ -140,17 +140,17 @@ mod tests {
 
     #[test]
     fn halves_are_uniform() {
-        assert_eq!(halves(0), (0.0, 0.0));
-        let largest = halves(u64::MAX);
+        assert_eq!(uniform_pair(0), (0.0, 0.0));
+        let largest = uniform_pair(u64::MAX);
         assert!(largest.0 == 1.0 - 2f64.powi(-32) && largest.0 == largest.1);
-        assert_eq!(halves(1 << 31), (0.5, 0.0));
-        let mut draws = Draws::default();
+        assert_eq!(uniform_pair(1 << 31), (0.5, 0.0));
+        let mut draws = RandomStreams::default();
         draws.resize(100, 3);
         draws.seed(1);
         let (mut sum, mut squares, mut product) = (0.0, 0.0, 0.0);
         for _ in 0..1000 {
             for &draw in draws.step() {
-                let (a, b) = halves(draw);
+                let (a, b) = uniform_pair(draw);
                 sum += a + b;
                 squares += a * a + b * b;
                 product += a * b;
@@ -164,10 +164,10 @@ mod tests {
 
     #[test]
     fn lots_are_uniform() {
-        let mut lots = Lots::new(3);
+        let mut integers = RandomIntegers::new(3);
         let mut seen = [0_u32; 7];
         for _ in 0..70_000 {
-            seen[lots.below(7)] += 1;
+            seen[integers.below(7)] += 1;
         }
         assert!(seen.iter().all(|&count| count.abs_diff(10_000) < 500), "{seen:?}");
     }

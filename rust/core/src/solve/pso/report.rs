@@ -1,8 +1,14 @@
-//! How a run ended.
+//! Outcome of a run.
 
 use crate::status::Status;
 
 /// Why a run ended.
+///
+/// ```
+/// use tdcr::solve::pso::Stop;
+///
+/// assert_eq!(Stop::Stagnation.as_str(), "stagnation");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The best value is as low as wanted.
@@ -46,7 +52,20 @@ impl Stop {
     }
 }
 
-/// How a run ended.
+/// Outcome of a run.
+///
+/// ```
+/// use tdcr::solve::pso::{Pointwise, PsoSettings, Stop, Swarm};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let settings = PsoSettings { max_iterations: 2, target: Some(0.0), ..PsoSettings::default() };
+/// let mut swarm = Swarm::new(settings, &[-1.0], &[1.0])?;
+/// let Ok(report) = swarm.run(&mut Pointwise(|x: &[f64]| x[0] * x[0] + 1.0));
+/// assert_eq!((report.stop, report.evaluations), (Stop::Iterations, 3 * 30));
+/// assert!(report.message(settings.target).contains("the most allowed"));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// The outcome: converged at the target, or stagnated without one; iteration limit when it
@@ -67,7 +86,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// What stood in the way, in a sentence; empty when it converged.
+    /// Reason why a run did not converge, in a sentence; empty when it did.
     #[must_use]
     pub fn message(&self, target: Option<f64>) -> String {
         if self.status == Status::Converged {

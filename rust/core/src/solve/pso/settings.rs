@@ -1,8 +1,14 @@
-//! What a swarm is, and when it stops.
+//! Settings of a swarm, and its stopping rules.
 
 use crate::error::InvalidInput;
 
-/// How a particle draws its next place between its own best point and its leader's.
+/// Distribution from which a particle draws its next position.
+///
+/// ```
+/// use tdcr::solve::pso::{PsoSettings, Sampling};
+///
+/// assert_eq!(PsoSettings::spso2011().sampling, Sampling::Sphere);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sampling {
     /// Every coordinate by itself: uniform in a box along the axes, which prefers them.
@@ -13,6 +19,13 @@ pub enum Sampling {
 }
 
 /// Whose best point a particle knows besides its own.
+///
+/// ```
+/// use tdcr::solve::pso::{PsoSettings, Topology};
+///
+/// let ring = PsoSettings { topology: Topology::Ring, neighbours: 2, ..PsoSettings::default() };
+/// assert!(ring.validate().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topology {
     /// Everybody's ("gbest"): fast, and easily caught.
@@ -24,7 +37,13 @@ pub enum Topology {
     Random,
 }
 
-/// What happens to a coordinate that leaves the box.
+/// Treatment of a coordinate that leaves the box.
+///
+/// ```
+/// use tdcr::solve::pso::{Bounds, PsoSettings};
+///
+/// assert_eq!(PsoSettings::default().bounds, Bounds::Absorb);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bounds {
     /// It stops on the bound; its velocity stays.
@@ -59,10 +78,18 @@ names!(Sampling: Box = "box", Sphere = "sphere");
 names!(Topology: Global = "global", Ring = "ring", Random = "random");
 names!(Bounds: Clamp = "clamp", Reflect = "reflect", Absorb = "absorb", Rebound = "rebound");
 
-/// What a swarm is, and when it stops.
+/// Settings of a swarm, and its stopping rules.
+///
+/// ```
+/// use tdcr::solve::pso::PsoSettings;
+///
+/// let settings = PsoSettings { particles: 50, seed: 7, ..PsoSettings::constriction() };
+/// assert!(settings.validate().is_ok());
+/// assert!(PsoSettings { particles: 0, ..settings }.validate().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PsoSettings {
-    /// How a particle draws its next place.
+    /// Distribution from which a particle draws its next position.
     pub sampling: Sampling,
     /// Share of the velocity that is kept, omega.
     pub inertia: f64,
@@ -77,7 +104,7 @@ pub struct PsoSettings {
     pub neighbours: usize,
     /// Size of the swarm.
     pub particles: usize,
-    /// What happens to a coordinate that leaves the box.
+    /// Treatment of a coordinate that leaves the box.
     pub bounds: Bounds,
     /// Largest velocity of a coordinate per iteration, as a share of the box's width.
     pub velocity_limit: Option<f64>,
@@ -96,13 +123,13 @@ pub struct PsoSettings {
     pub seed: u64,
 }
 
-/// Moves that can be asked for: their history is kept, and its place is taken before the first.
+/// Largest number of moves: memory for their history is reserved before the first.
 const MOST_ITERATIONS: usize = 1_000_000;
 
 /// Size of a swarm that can be asked for.
 const MOST_PARTICLES: usize = 1_000_000;
 
-/// Links that a swarm may have: all are gone through between two moves, where nothing can stop it.
+/// Largest number of links: all are visited between two moves, where nothing can stop the run.
 const MOST_LINKS: usize = 10_000_000;
 
 /// Clerc & Kennedy's phi = c1 + c2 with c1 = c2 = 2.05.
@@ -214,7 +241,7 @@ impl PsoSettings {
         Ok(())
     }
 
-    /// Refuses more neighbours than there are particles, and more links than can be gone through.
+    /// Refuses more neighbours than there are particles, and more links than can be visited.
     fn check_links(&self) -> Result<(), InvalidInput> {
         let most = self.particles.min(MOST_LINKS / self.particles);
         if self.topology == Topology::Global || self.neighbours <= most {

@@ -1,8 +1,8 @@
 //! A run: evaluate, remember, follow, move.
 
 use super::objective::{Objective, Progress};
-use super::particles::Cloud;
-use super::random::Draws;
+use super::particles::Particles;
+use super::random::RandomStreams;
 use super::report::{Report, Stop};
 use super::settings::PsoSettings;
 use super::topology::Leaders;
@@ -26,8 +26,8 @@ use crate::error::InvalidInput;
 pub struct Swarm {
     settings: PsoSettings,
     dimensions: usize,
-    cloud: Cloud,
-    draws: Draws,
+    particles: Particles,
+    draws: RandomStreams,
     leaders: Leaders,
     /// The value at every particle, and the lowest at each so far: infinity as long as there is none.
     values: Vec<f64>,
@@ -37,7 +37,7 @@ pub struct Swarm {
     run: Run,
 }
 
-/// What a run counts.
+/// Counters of a run.
 #[derive(Clone, Copy, Debug, Default)]
 struct Run {
     /// The particle with the lowest value so far.
@@ -45,7 +45,7 @@ struct Run {
     iterations: usize,
     evaluations: usize,
     nan_count: usize,
-    /// Whether the last iteration changed any particle's best point, and lowered the best of all.
+    /// Flags of the last iteration: any particle's best point changed, the best of all fell.
     learned: bool,
     better: bool,
     /// The best value at the last progress, and the iterations since.
@@ -68,8 +68,8 @@ impl Swarm {
         let mut swarm = Self {
             settings,
             dimensions: 0,
-            cloud: Cloud::default(),
-            draws: Draws::default(),
+            particles: Particles::default(),
+            draws: RandomStreams::default(),
             leaders: Leaders::default(),
             values: Vec::new(),
             own: Vec::new(),
@@ -96,7 +96,7 @@ impl Swarm {
         fits(&settings, lower.len())?;
         self.settings = settings;
         self.dimensions = lower.len();
-        self.cloud.resize(&settings, lower, upper);
+        self.particles.resize(&settings, lower, upper);
         self.draws.resize(settings.particles, lower.len());
         self.leaders.resize(&settings);
         self.values.resize(settings.particles, f64::NAN);
@@ -133,7 +133,7 @@ impl Swarm {
             return Err(InvalidInput::new("start", expected, got));
         }
         for (e, &x) in points.iter().enumerate() {
-            if !self.cloud.holds(e, x) {
+            if !self.particles.contains(e, x) {
                 let got = format!("{x:?} in coordinate {} of point {}", e % n, e / n);
                 return Err(InvalidInput::new("start", "points inside the box", got));
             }
@@ -155,8 +155,8 @@ impl Swarm {
             if let Some(stop) = self.stop(watched) {
                 return Ok(self.report(stop));
             }
-            self.lead();
-            self.cloud.sweep(&self.settings, &self.leaders.of, self.draws.step());
+            self.choose_leaders();
+            self.particles.advance(&self.settings, &self.leaders.of, self.draws.step());
             self.run.iterations += 1;
             self.evaluate(objective)?;
         }
@@ -165,7 +165,7 @@ impl Swarm {
     /// The best point of the last run. Without a value below infinity, that of no merit.
     #[must_use]
     pub fn best(&self) -> &[f64] {
-        self.cloud.best(self.run.best)
+        self.particles.best(self.run.best)
     }
 
     /// The lowest value of the last run after every iteration, the start first.
@@ -174,10 +174,10 @@ impl Swarm {
         &self.history
     }
 
-    /// The particles' places after the last run, in rows.
+    /// Positions of the particles after the last run, in rows.
     #[must_use]
     pub fn places(&self) -> &[f64] {
-        &self.cloud.places
+        &self.particles.positions
     }
 
     fn begin(&mut self) {
@@ -186,15 +186,15 @@ impl Swarm {
         self.own.fill(f64::INFINITY);
         self.history.clear();
         self.run = Run { milestone: f64::INFINITY, ..Run::default() };
-        self.cloud.scatter(self.draws.step());
-        self.cloud.place(&self.starts);
+        self.particles.initialize(self.draws.step());
+        self.particles.set_positions(&self.starts);
     }
 
-    /// Values of all places, and what the particles remember of them.
+    /// Evaluates all positions and updates the particles' best points.
     fn evaluate<O: Objective>(&mut self, objective: &mut O) -> Result<(), O::Error> {
         // An objective that leaves a value out has not found one there.
         self.values.fill(f64::NAN);
-        objective.values(&self.cloud.places, self.dimensions, &mut self.values)?;
+        objective.values(&self.particles.positions, self.dimensions, &mut self.values)?;
         let run = &mut self.run;
         run.evaluations += self.values.len();
         (run.learned, run.better) = (false, false);
@@ -203,14 +203,14 @@ impl Swarm {
             run.nan_count += usize::from(value.is_nan());
             if value < self.own[particle] {
                 self.own[particle] = value;
-                self.cloud.remember(particle);
+                self.particles.store_best(particle);
                 run.learned = true;
                 if value < self.own[run.best] {
                     run.best = particle;
                 }
             } else if self.own[particle] == f64::INFINITY {
                 // Nothing to remember yet: not to be drawn back to where it started.
-                self.cloud.remember(particle);
+                self.particles.store_best(particle);
                 run.learned = true;
             }
         }
@@ -253,13 +253,13 @@ impl Swarm {
     }
 
     /// Leaders and their best points, where they can have changed.
-    fn lead(&mut self) {
+    fn choose_leaders(&mut self) {
         let run = &self.run;
         let first = run.iterations == 0;
         let random = self.leaders.is_random();
         if first || run.learned || (random && !run.better) {
             self.leaders.choose(&self.settings, &self.own, run.best, run.better && !first);
-            self.cloud.follow(&self.leaders.of);
+            self.particles.update_leaders(&self.leaders.of);
         }
     }
 

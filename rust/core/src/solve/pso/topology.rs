@@ -1,6 +1,6 @@
-//! Who leads whom.
+//! Leaders of the particles.
 
-use super::random::Lots;
+use super::random::RandomIntegers;
 use super::settings::{PsoSettings, Topology};
 
 /// The leader of every particle: the best one that it knows.
@@ -9,11 +9,11 @@ pub(super) struct Leaders {
     /// Particle numbers; a particle that knows of no value follows itself.
     pub(super) of: Vec<usize>,
     /// Whom every particle informs, `neighbours` each.
-    informed: Vec<usize>,
-    lots: Lots,
+    informants_of: Vec<usize>,
+    integers: RandomIntegers,
 }
 
-/// How many links a swarm draws.
+/// Number of links that a swarm draws.
 pub(super) fn links(settings: &PsoSettings) -> usize {
     match settings.topology {
         Topology::Random => settings.neighbours.saturating_mul(settings.particles),
@@ -23,7 +23,7 @@ pub(super) fn links(settings: &PsoSettings) -> usize {
 
 impl Default for Leaders {
     fn default() -> Self {
-        Self { of: Vec::new(), informed: Vec::new(), lots: Lots::new(0) }
+        Self { of: Vec::new(), informants_of: Vec::new(), integers: RandomIntegers::new(0) }
     }
 }
 
@@ -31,17 +31,17 @@ impl Leaders {
     /// Sizes the buffers.
     pub(super) fn resize(&mut self, settings: &PsoSettings) {
         self.of.resize(settings.particles, 0);
-        self.informed.resize(links(settings), 0);
+        self.informants_of.resize(links(settings), 0);
     }
 
     /// Starts the stream of the random links.
     pub(super) fn seed(&mut self, seed: u64) {
-        self.lots = Lots::new(seed);
+        self.integers = RandomIntegers::new(seed);
     }
 
-    /// Whether links are drawn, not given.
+    /// True when links are drawn, not given.
     pub(super) fn is_random(&self) -> bool {
-        !self.informed.is_empty()
+        !self.informants_of.is_empty()
     }
 
     /// Finds the leaders among the particles' best values. `better`: whether the last iteration
@@ -55,27 +55,27 @@ impl Leaders {
     ) {
         match settings.topology {
             // As long as there is no value, everybody is on its own.
-            Topology::Global if own[best] == f64::INFINITY => self.everyone_alone(),
+            Topology::Global if own[best] == f64::INFINITY => self.everyone_leads_itself(),
             Topology::Global => self.of.fill(best),
-            Topology::Ring => self.along_the_ring(settings.neighbours, own),
+            Topology::Ring => self.lead_along_ring(settings.neighbours, own),
             Topology::Random => {
                 if !better {
-                    for place in &mut self.informed {
-                        *place = self.lots.below(own.len());
+                    for place in &mut self.informants_of {
+                        *place = self.integers.below(own.len());
                     }
                 }
-                self.by_links(settings.neighbours, own);
+                self.lead_by_links(settings.neighbours, own);
             }
         }
     }
 
-    fn everyone_alone(&mut self) {
+    fn everyone_leads_itself(&mut self) {
         for (particle, leader) in self.of.iter_mut().enumerate() {
             *leader = particle;
         }
     }
 
-    fn along_the_ring(&mut self, sides: usize, own: &[f64]) {
+    fn lead_along_ring(&mut self, sides: usize, own: &[f64]) {
         let count = own.len();
         // More on either side than there are: everybody, once.
         let sides = sides.min(count / 2);
@@ -93,9 +93,9 @@ impl Leaders {
         }
     }
 
-    fn by_links(&mut self, informed: usize, own: &[f64]) {
-        self.everyone_alone();
-        for (informer, links) in self.informed.chunks_exact(informed).enumerate() {
+    fn lead_by_links(&mut self, informants_of: usize, own: &[f64]) {
+        self.everyone_leads_itself();
+        for (informer, links) in self.informants_of.chunks_exact(informants_of).enumerate() {
             for &particle in links {
                 if own[informer] < own[self.of[particle]] {
                     self.of[particle] = informer;

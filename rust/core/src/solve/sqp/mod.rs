@@ -8,56 +8,25 @@
 //! multiplier estimate it has no Maratos effect, so the fast end phase is never damped.
 
 mod null_space;
+mod problem;
 
 use nalgebra::{SMatrix, SVector};
 
 use null_space::{Frame, Step};
+pub use problem::{Linearization, Problem};
 
-/// Value and first derivatives of a problem at one point.
-#[derive(Clone, Copy, Debug)]
-pub struct Linearization<const N: usize, const M: usize> {
-    /// Objective.
-    pub objective: f64,
-    /// Gradient of the objective in local coordinates.
-    pub gradient: SVector<f64, N>,
-    /// Constraint values, wanted zero.
-    pub constraints: SVector<f64, M>,
-    /// Gradients of the constraints as columns.
-    pub jacobian_transposed: SMatrix<f64, N, M>,
-}
-
-/// An equality-constrained problem on a manifold with `N` local coordinates.
-pub trait Problem<const N: usize, const M: usize> {
-    /// A point of the manifold with whatever is worth keeping between the calls below.
-    type Point: Copy;
-
-    /// Objective, constraints and their gradients, every entry written.
-    fn linearize(&self, point: &Self::Point, out: &mut Linearization<N, M>);
-
-    /// Second derivatives of `f + multipliers . c` along the (second-order) retraction.
-    fn hessian(&self, point: &Self::Point, multipliers: &SVector<f64, M>) -> SMatrix<f64, N, N>;
-
-    /// Puts the point reached by `factor` times a step in local coordinates into `out`.
-    fn retract(
-        &self,
-        point: &Self::Point,
-        step: &SVector<f64, N>,
-        factor: f64,
-        out: &mut Self::Point,
-    );
-
-    /// Whether the point lies on the branch whose minimum is wanted; steps that leave it are cut.
-    fn admissible(&self, point: &Self::Point) -> bool;
-
-    /// Size of a step in the units that the tolerance and the step bound are stated in.
-    fn step_size(&self, step: &SVector<f64, N>) -> f64;
-}
-
-/// How long and how precisely to iterate.
+/// Settings of the iteration: tolerances, bounds, budget.
+///
+/// ```
+/// use tdcr::linkage::LinkageSettings;
+///
+/// let settings = LinkageSettings::default().sqp();
+/// assert!(settings.constraint_tolerance < settings.step_tolerance);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The iteration ends with the first full Newton step below this; that step is still taken, so
-    /// the error left is about its square.
+    /// the remaining error is about its square.
     pub step_tolerance: f64,
     /// No step is longer: trial points stay where the quadratic model means something.
     pub step_bound: f64,
@@ -68,6 +37,17 @@ pub struct Settings {
 }
 
 /// Why the iteration ended.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::linkage::seven_bar::Hole;
+/// use tdcr::linkage::{LinkageSettings, solve_four_bar};
+/// use tdcr::solve::sqp::Ending;
+///
+/// let hole = Vector3::new(0.5, 0.0, 0.0);
+/// let settings = LinkageSettings::default().sqp();
+/// assert_eq!(solve_four_bar(&Hole::new(hole, hole, 0.1), &settings).ending, Ending::Converged);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// The Newton step fell below the tolerance with the constraints met.
@@ -81,6 +61,13 @@ pub enum Ending {
 }
 
 /// The last point and how it was reached.
+///
+/// ```
+/// use tdcr::solve::sqp::{Ending, Solution};
+///
+/// let solution = Solution::<f64, 1>::without_iterations(0.5);
+/// assert_eq!((solution.ending, solution.iterations), (Ending::Converged, 0));
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Solution<P, const M: usize> {
     /// The last point, solution or not.
@@ -100,7 +87,7 @@ pub struct Solution<P, const M: usize> {
 impl<P, const M: usize> Solution<P, M> {
     /// An answer that needed no iteration.
     #[must_use]
-    pub fn known(point: P) -> Self {
+    pub fn without_iterations(point: P) -> Self {
         Self {
             point,
             multipliers: SVector::zeros(),
@@ -122,12 +109,12 @@ const ARMIJO: f64 = 1e-4;
 const INITIAL_PENALTY: f64 = 10.0;
 
 /// A point and its derivatives; two of them take turns, so that nothing is copied.
-struct Slot<P, const N: usize, const M: usize> {
+struct Iterate<P, const N: usize, const M: usize> {
     point: P,
     at: Linearization<N, M>,
 }
 
-impl<P: Copy, const N: usize, const M: usize> Slot<P, N, M> {
+impl<P: Copy, const N: usize, const M: usize> Iterate<P, N, M> {
     fn new(point: P) -> Self {
         let at = Linearization {
             objective: 0.0,
@@ -139,7 +126,7 @@ impl<P: Copy, const N: usize, const M: usize> Slot<P, N, M> {
     }
 
     /// Moves here from `from` by a share of a step.
-    fn go<Q: Problem<N, M, Point = P>>(
+    fn move_to<Q: Problem<N, M, Point = P>>(
         &mut self,
         problem: &Q,
         from: &Self,
@@ -153,7 +140,7 @@ impl<P: Copy, const N: usize, const M: usize> Slot<P, N, M> {
     }
 }
 
-/// Minimises `problem` from `start`. Where the iteration fails with the constraints unmet, it looks
+/// Minimises `problem` from `start`. Where the iteration fails with the constraints unmet, it searches
 /// for a feasible point, and starts again from there or says that there is none nearby.
 pub fn minimize<const N: usize, const M: usize, P: Problem<N, M>>(
     problem: &P,
@@ -183,9 +170,10 @@ fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
     start: P::Point,
     settings: &Settings,
 ) -> Solution<P::Point, M> {
-    let (mut one, mut other) = (Slot::new(start), Slot::new(start));
+    let (mut one, mut other) = (Iterate::new(start), Iterate::new(start));
     // References, so that taking turns moves no data.
     let (mut here, mut there) = (&mut one, &mut other);
+    // f, c and their gradients at the start; null-space basis and least-squares multipliers (eq. 18.21).
     problem.linearize(&here.point, &mut here.at);
     let mut penalty = INITIAL_PENALTY;
     let mut ending = Ending::IterationLimit;
@@ -193,6 +181,7 @@ fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
     let mut frame = Frame::new();
     frame.adapt(&here.at);
     while iterations < settings.max_iterations {
+        // Step of the quadratic model (algorithm 16.2).
         let hessian = problem.hessian(&here.point, &frame.multipliers);
         let Some(step) = frame.newton_step(&here.at, hessian) else {
             ending = Ending::NumericalError;
@@ -200,17 +189,19 @@ fn descend<const N: usize, const M: usize, P: Problem<N, M>>(
         };
         iterations += 1;
         let size = problem.step_size(&step.full);
+        // A full Newton step below the tolerance is the last; others are searched along.
         let last = step.exact && size <= settings.step_tolerance;
         let moved = if last {
-            there.go(problem, here, &step.full, 1.0);
+            there.move_to(problem, here, &step.full, 1.0);
             true
         } else {
             let limit = (settings.step_bound / size.max(f64::MIN_POSITIVE)).min(1.0);
-            search(problem, here, there, &step, limit, &mut penalty)
+            line_search(problem, here, there, &step, limit, &mut penalty)
         };
         if !moved {
             break;
         }
+        // The new point, with its own basis and multipliers.
         std::mem::swap(&mut here, &mut there);
         frame.adapt(&here.at);
         if last && here.at.constraints.amax() <= settings.constraint_tolerance {
@@ -240,7 +231,7 @@ fn restore<const N: usize, const M: usize, P: Problem<N, M>>(
     start: P::Point,
     settings: &Settings,
 ) -> (P::Point, f64) {
-    let (mut one, mut other) = (Slot::new(start), Slot::new(start));
+    let (mut one, mut other) = (Iterate::new(start), Iterate::new(start));
     let (mut here, mut there) = (&mut one, &mut other);
     problem.linearize(&here.point, &mut here.at);
     let mut damping = 1e-3;
@@ -254,7 +245,7 @@ fn restore<const N: usize, const M: usize, P: Problem<N, M>>(
         let Some(inverse) = (gram + shift).try_inverse() else { break };
         let step = columns * (inverse * constraints) * -1.0;
         let size = problem.step_size(&step).max(f64::MIN_POSITIVE);
-        there.go(problem, here, &step, (settings.step_bound / size).min(1.0));
+        there.move_to(problem, here, &step, (settings.step_bound / size).min(1.0));
         if there.at.constraints.norm_squared() < here.at.constraints.norm_squared() {
             std::mem::swap(&mut here, &mut there);
             damping = (0.2 * damping).max(1e-15);
@@ -267,10 +258,10 @@ fn restore<const N: usize, const M: usize, P: Problem<N, M>>(
 
 /// Backtracks along the step until the augmented Lagrangian falls enough; the accepted point is in
 /// `there`.
-fn search<const N: usize, const M: usize, P: Problem<N, M>>(
+fn line_search<const N: usize, const M: usize, P: Problem<N, M>>(
     problem: &P,
-    here: &Slot<P::Point, N, M>,
-    there: &mut Slot<P::Point, N, M>,
+    here: &Iterate<P::Point, N, M>,
+    there: &mut Iterate<P::Point, N, M>,
     step: &Step<N, M>,
     limit: f64,
     penalty: &mut f64,
@@ -292,7 +283,7 @@ fn search<const N: usize, const M: usize, P: Problem<N, M>>(
     let noise = 1e-14 * before.abs() + 1e-300;
     let mut factor = limit;
     for _ in 0..BACKTRACKS {
-        let admissible = there.go(problem, here, &step.full, factor);
+        let admissible = there.move_to(problem, here, &step.full, factor);
         if admissible && merit(&there.at) <= before + ARMIJO * factor * slope + noise {
             return true;
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::Linearization;
+use super::problem::Linearization;
 
 /// A step of the quadratic model.
 pub(super) struct Step<const N: usize, const M: usize> {

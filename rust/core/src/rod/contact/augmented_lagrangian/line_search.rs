@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{CHANGE, Descent, SHIFT, SHIFTS, Surroundings};
 use crate::lie::so3;
 use crate::obstacle::Fault;
-use crate::solve::quadratic_program::dot;
+use crate::solve::dense::dot;
 
 /// No strain moves further in one step \[rad\].
 const STEP: f64 = 0.5;

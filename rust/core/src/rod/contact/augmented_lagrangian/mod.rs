@@ -12,7 +12,7 @@ use super::scene::Scene;
 use crate::obstacle::Fault;
 use crate::rod::dual_newton::Ending;
 use crate::rod::plan::Plan;
-use crate::solve::quadratic_program::dot;
+use crate::solve::dense::dot;
 
 /// So many steps below the value's rounding may pass without the moment halving.
 const BLIND: usize = 4;

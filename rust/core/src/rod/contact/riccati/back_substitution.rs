@@ -4,7 +4,7 @@ use nalgebra::{Vector3, Vector6};
 
 use super::Sweep;
 use crate::rod::plan::Plan;
-use crate::solve::quadratic_program::{backward, dot, forward};
+use crate::solve::dense::{backward, dot, forward};
 
 impl Sweep {
     /// The step that undoes a slope, in `right`.

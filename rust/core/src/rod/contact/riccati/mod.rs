@@ -15,7 +15,7 @@ use crate::lie::so3::hat;
 use crate::rod::newton_system::raise;
 use crate::rod::plan::Plan;
 use crate::rod::subsegment::{Derivatives, Local, Node};
-use crate::solve::quadratic_program::{cholesky, dot};
+use crate::solve::dense::{cholesky, dot};
 use back_substitution::escape;
 
 /// What a sweep is made at.
