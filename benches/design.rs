@@ -16,7 +16,7 @@ use tdcr::Status;
 use tdcr::design::{PrebendSettings, RoutingSettings, points_on_curve, prebend, routing};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Subsegment, TendonRule};
+use tdcr::rod::{Plan, Rod, RodSettings, Subsegment, TendonLaw};
 
 use finger::finger;
 
@@ -26,7 +26,7 @@ fn designs(c: &mut Criterion) {
     let (robot, curve) = finger(0.064);
     let targets = points_on_curve(&robot, &curve, Subsegment::Arc).unwrap();
     let mut group = c.benchmark_group("design/sphere_finger_9");
-    let proportional = RodSettings { tendons: TendonRule::Proportional, ..Default::default() };
+    let proportional = RodSettings { tendons: TendonLaw::Proportional, ..Default::default() };
     for (name, rod, tolerance) in
         [("march", RodSettings::default(), 1e-10), ("descent", proportional, 1e-3)]
     {

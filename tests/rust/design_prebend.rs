@@ -11,7 +11,7 @@ use tdcr::Status;
 use tdcr::design::{PrebendSettings, points_on_curve, prebend, prebend_stopped_by};
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Subsegment, TendonRule};
+use tdcr::rod::{Plan, Rod, RodSettings, Subsegment, TendonLaw};
 
 use crate::finger::finger;
 
@@ -118,7 +118,7 @@ fn different_pulls_need_different_rest_shapes() {
 #[test]
 fn other_settings_are_met_by_descent() {
     let (robot, curve) = finger(0.064);
-    for (elements, tendons) in [(3, TendonRule::Sliding), (1, TendonRule::Proportional)] {
+    for (elements, tendons) in [(3, TendonLaw::Sliding), (1, TendonLaw::Proportional)] {
         let targets = points_on_curve(&robot, &curve, Subsegment::Arc).unwrap();
         let rod = RodSettings { elements, tendons, ..Default::default() };
         let settings = PrebendSettings { rod, tolerance: 1e-3, ..Default::default() };
@@ -180,7 +180,7 @@ fn planar_proportional_designs_have_the_closed_form() {
         });
         let closed: Vec<f64> = closed.collect();
 
-        let rod = RodSettings { tendons: TendonRule::Proportional, ..free };
+        let rod = RodSettings { tendons: TendonLaw::Proportional, ..free };
         let settings = PrebendSettings { rod, ..Default::default() };
         let answer = prebend(&bent(&[0.0; 9]), &targets, &[pull], &settings).unwrap();
         assert_eq!(answer.status, Status::Converged, "{}", answer.message);
@@ -223,7 +223,7 @@ fn places_nearer_than_the_rod_is_long_are_folded_to() {
 fn a_flag_ends_a_design() {
     let (robot, curve) = finger(0.064);
     let targets = points_on_curve(&robot, &curve, Subsegment::Arc).unwrap();
-    let rod = RodSettings { tendons: TendonRule::Proportional, ..Default::default() };
+    let rod = RodSettings { tendons: TendonLaw::Proportional, ..Default::default() };
     let settings = PrebendSettings { rod, ..Default::default() };
     let stop = Arc::new(AtomicBool::new(true));
     let answer = prebend_stopped_by(&robot, &targets, &[-0.005], &settings, &stop).unwrap();

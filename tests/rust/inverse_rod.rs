@@ -9,7 +9,7 @@ use tdcr::inverse::{
 };
 use tdcr::lie::{Pose, so3};
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, RodSettings, Subsegment, TendonRule};
+use tdcr::rod::{Plan, RodSettings, Subsegment, TendonLaw};
 use tdcr::{Shape, Status};
 
 use crate::inverse_common::{transform, uniform};
@@ -341,7 +341,7 @@ fn what_does_not_fit_is_refused() {
     let tension = range(vec![-2.0], vec![-1.0]);
     let got = refused(Bounds { tension, ..Bounds::default() });
     assert_eq!(got.as_deref(), Some("bounds.tension"));
-    let proportional = RodSettings { tendons: TendonRule::Proportional, ..RodSettings::default() };
+    let proportional = RodSettings { tendons: TendonLaw::Proportional, ..RodSettings::default() };
     let plan = Plan::new(&robot, proportional).unwrap();
     let error = RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default());
     assert_eq!(error.unwrap_err().argument, "settings.tendons");

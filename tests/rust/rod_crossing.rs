@@ -9,7 +9,7 @@ use tdcr::Status;
 use tdcr::lie::so3;
 use tdcr::model::Model;
 use tdcr::robot::{PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Scratch, Subsegment, TendonRule};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch, Subsegment, TendonLaw};
 
 use crate::common::robot;
 
@@ -134,7 +134,7 @@ fn both_mirror_images_have_the_same_energy() {
 #[test]
 fn every_kind_of_element_and_rule_gets_there() {
     for subsegment in Subsegment::ALL {
-        for tendons in TendonRule::ALL {
+        for tendons in TendonLaw::ALL {
             for elements in [1, 2, 3] {
                 let settings =
                     RodSettings { subsegment, tendons, elements, ..RodSettings::default() };

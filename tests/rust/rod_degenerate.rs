@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Scratch, Subsegment, TendonRule};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch, Subsegment, TendonLaw};
 use tdcr::{InvalidInput, Shape, Status};
 
 use crate::common::{FREE, robot, straight};
@@ -30,7 +30,7 @@ fn ring(n: usize, count: usize) -> Robot {
 fn settings() -> Vec<RodSettings> {
     let mut all = Vec::new();
     for subsegment in Subsegment::ALL {
-        for tendons in TendonRule::ALL {
+        for tendons in TendonLaw::ALL {
             all.extend([1, 2].map(|elements| RodSettings {
                 subsegment,
                 tendons,
@@ -279,7 +279,7 @@ fn input_that_makes_no_sense_is_refused() {
     for wrong in [&[0.0][..], &[0.0; 3], &[f64::NAN, 0.0], &[-FREE, 0.0]] {
         assert_eq!(rod.shape(wrong).unwrap_err().argument, "displacements");
     }
-    let settings = RodSettings { tendons: TendonRule::Proportional, ..default() };
+    let settings = RodSettings { tendons: TendonLaw::Proportional, ..default() };
     let proportional = Plan::new(&trunk, settings).unwrap();
     let error = Rod::new(&trunk, &proportional).solve_tensions(&[0.0; 2], &mut work).unwrap_err();
     assert_eq!(error.argument, "tendons");

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tdcr::model::Model;
 use tdcr::robot::Robot;
-use tdcr::rod::{Plan, Rod, RodSettings, Scratch, TendonRule};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch, TendonLaw};
 use tdcr::{Shape, Status};
 
 use crate::common::FREE;
@@ -345,7 +345,7 @@ fn nothing_pulled_is_the_rest_shape() {
     for case in cases(40) {
         let robot: Robot = case.recipe.robot();
         let rest = robot.rest_frames();
-        for tendons in TendonRule::ALL {
+        for tendons in TendonLaw::ALL {
             for elements in [1, 3] {
                 let settings = RodSettings { tendons, elements, ..Default::default() };
                 for displacement in [0.0, FREE] {

@@ -26,7 +26,7 @@ use tdcr::lie::so3;
 use tdcr::linkage::{self, Linkage, LinkageSettings};
 use tdcr::model::Model;
 use tdcr::robot::{Robot, Tendon};
-use tdcr::rod::{RodSettings, Subsegment, TendonRule};
+use tdcr::rod::{RodSettings, Subsegment, TendonLaw};
 use tdcr::{Shape, Status};
 
 use crate::common::{robot, straight};
@@ -197,7 +197,7 @@ fn a_tendon_pulled_by_too_little_is_slack() {
 fn links_in_proportion_are_the_linkage() {
     let settings = RodSettings {
         subsegment: Subsegment::Link,
-        tendons: TendonRule::Proportional,
+        tendons: TendonLaw::Proportional,
         ..Default::default()
     };
     let (length, mut place, mut turn, mut beside) = (0.2_f64, 0.0_f64, 0.0_f64, 0.0_f64);

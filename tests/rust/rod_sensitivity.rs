@@ -7,7 +7,7 @@ use tdcr::Status;
 use tdcr::lie::Pose;
 use tdcr::model::Model;
 use tdcr::robot::{Backbone, BackboneSpec, PerDisk, Robot, Routing, Tendon};
-use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch, Subsegment, TendonRule};
+use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch, Subsegment, TendonLaw};
 
 /// What a robot is made of, as plain numbers that can be changed.
 #[derive(Clone)]
@@ -101,7 +101,7 @@ fn solved(recipe: &Recipe, settings: RodSettings, pulls: &[f64]) -> (Scratch, Ro
 fn all_settings() -> Vec<RodSettings> {
     let mut all = Vec::new();
     for subsegment in Subsegment::ALL {
-        for tendons in TendonRule::ALL {
+        for tendons in TendonLaw::ALL {
             for elements in [1, 2] {
                 for axial in [false, true] {
                     let tolerance = 1e-13;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use tdcr::Status;
 use tdcr::model::Model;
 use tdcr::robot::{Robot, Routing, Tendon};
-use tdcr::rod::{Plan, Rod, RodSettings, Scratch, TendonRule};
+use tdcr::rod::{Plan, Rod, RodSettings, Scratch, TendonLaw};
 
 use crate::common::robot;
 
@@ -20,7 +20,7 @@ fn helix(n: usize) -> Robot {
 #[test]
 fn a_flag_that_is_set_ends_every_kind_of_solve() {
     let robot = helix(20);
-    for tendons in TendonRule::ALL {
+    for tendons in TendonLaw::ALL {
         let plan = Plan::new(&robot, RodSettings { tendons, ..Default::default() }).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
         let rod = Rod::new(&robot, &plan).stopped_by(Arc::clone(&stop));
@@ -36,7 +36,7 @@ fn a_flag_that_is_set_ends_every_kind_of_solve() {
             // The last iterate, whole.
             assert_eq!(rod.state(&work).frames.len(), 21);
         }
-        if tendons == TendonRule::Sliding {
+        if tendons == TendonLaw::Sliding {
             let report = rod.solve_tensions(&[10.0], &mut work).unwrap();
             assert_eq!(report.status, Status::IterationLimit);
             assert_eq!(rod.message(&[], &work), "stopped before the end");

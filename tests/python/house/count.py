@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .python_source import PythonSource
-from .rust_source import Function, RustSource
+from .python_source import PythonSource, python_source
+from .rust_source import Function, RustSource, rust_source
 from .words import OPENING, is_old_file, is_participle, old_names
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -87,7 +87,7 @@ def public_names(sources: dict[str, PythonSource]) -> set[str]:
 def count(tree: dict[str, str]) -> dict[str, Part]:
     """Counts of every part, and the prose of the pages."""
     parts = {name: Part() for name in (*PARTS, "stub", "pages")}
-    python = {p: PythonSource(t) for p, t in tree.items() if p.endswith((".py", ".pyi"))}
+    python = {p: python_source(t) for p, t in tree.items() if p.endswith((".py", ".pyi"))}
     public = public_names({p: s for p, s in python.items() if p.startswith(PARTS["Python"])})
     for path, text in tree.items():
         if path.endswith(".md"):
@@ -97,7 +97,7 @@ def count(tree: dict[str, str]) -> dict[str, Part]:
         name = next((n for n, folder in PARTS.items() if path.startswith(folder)), None)
         if name is None:
             continue
-        source = python[path] if path in python else RustSource(text)
+        source = python[path] if path in python else rust_source(text)
         add_file(parts["stub" if path == STUB else name], path, source, public)
     return parts
 

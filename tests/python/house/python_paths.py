@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from dataclasses import dataclass
 
-from .python_source import PythonSource
+from .python_source import python_source
 
 PACKAGE = "python/"
 
@@ -32,23 +32,11 @@ def python_imports(tree: dict[str, str]) -> list[Import]:
     files = {module_name(file): file for file in texts}
     found = []
     for file, text in texts.items():
-        nodes = PythonSource(text).tree
-        lazy = lazy_nodes(nodes)
-        for node in ast.walk(nodes):
+        source = python_source(text)
+        for node in source.nodes:
             for name in imported(node, file, files):
                 if files[name] != file:
-                    found.append(Import(file, files[name], node.lineno, node in lazy))
-    return found
-
-
-def lazy_nodes(tree: ast.Module) -> set[ast.AST]:
-    """Nodes inside functions, and those for type checkers only."""
-    found: set[ast.AST] = set()
-    for node in ast.walk(tree):
-        is_function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-        is_typing = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-        if is_function or is_typing:
-            found.update(ast.walk(node))
+                    found.append(Import(file, files[name], node.lineno, node in source.lazy_nodes))
     return found
 
 

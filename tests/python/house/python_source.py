@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import io
 import tokenize
-from functools import cached_property
+from functools import cache, cached_property
 
 from .rust_source import Function
 
@@ -20,6 +20,17 @@ class PythonSource:
         self.text = text
         self.tree = ast.parse(text)
         self.nodes = list(ast.walk(self.tree))
+
+    @cached_property
+    def lazy_nodes(self) -> set[ast.AST]:
+        """Nodes inside functions, and those for type checkers only."""
+        found: set[ast.AST] = set()
+        for node in self.nodes:
+            is_function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+            is_typing = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+            if (is_function or is_typing) and node not in found:
+                found.update(ast.walk(node))
+        return found
 
     @cached_property
     def doc_nodes(self) -> list[ast.Constant]:
@@ -92,3 +103,9 @@ class PythonSource:
             for node in self.nodes
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         ]
+
+
+@cache
+def python_source(text: str) -> PythonSource:
+    """Source of a text, read once however often it is asked for."""
+    return PythonSource(text)

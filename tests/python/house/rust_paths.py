@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-from .rust_source import RustSource, Token
+from .rust_source import RustSource, Token, rust_source
 
 STARTS = ("crate", "super", "self")
 Path = tuple[str, ...]
@@ -42,7 +42,7 @@ def read_crate(tree: dict[str, str], root: str) -> dict[Path, Module]:
     for file, text in tree.items():
         if file.startswith(root) and file.endswith(".rs"):
             path = module_path(file, root)
-            modules[path] = Module(file, path, RustSource(text))
+            modules[path] = Module(file, path, rust_source(text))
     for module in modules.values():
         read_paths(module, modules)
     return modules

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 PATTERN = re.compile(
     r"""
@@ -219,3 +219,9 @@ class RustSource:
             ):
                 return False
         return False
+
+
+@cache
+def rust_source(text: str) -> RustSource:
+    """Source of a text, read once however often it is asked for."""
+    return RustSource(text)

@@ -18,7 +18,7 @@ use crate::error::InvalidInput;
 use crate::model::Model;
 use crate::model::Shape;
 use crate::robot::{Backbone, Robot};
-use crate::rod::{Plan, Rod, RodSettings, Scratch, TendonRule};
+use crate::rod::{Plan, Rod, RodSettings, Scratch, TendonLaw};
 use crate::status::Status;
 
 /// Share by which a sum of squares may be above the least before more is sought.
@@ -152,7 +152,7 @@ impl Design<'_> {
         let rod = RodSettings {
             elements: 1,
             axial: false,
-            tendons: TendonRule::Sliding,
+            tendons: TendonLaw::Sliding,
             ..self.settings.rod
         };
         let plan = Plan::new(self.robot, rod)?;

@@ -109,10 +109,10 @@ fn nudge(plan: &Plan, chain: &mut Chain) -> bool {
             let size = plan.width();
             let strains = &chain.strains[own.subsegment * size..(own.subsegment + 1) * size];
             bench.differentiate(plan, own.subsegment, own.piece, strains);
-            for (c, a) in bench.row.iter().enumerate() {
-                let stiffness = plan.data[own.subsegment].stiffness[c % plan.unknowns()];
-                work -= a * (bench.gradient[c] - a) / stiffness;
-                lever += a * a / stiffness;
+            for (k, a) in bench.row.iter().enumerate() {
+                let (elasticity, c) = (&plan.data[own.subsegment].elasticity, k % plan.unknowns());
+                work -= elasticity.strain_under(c, a * (bench.gradient[k] - a));
+                lever += elasticity.strain_under(c, a * a);
             }
         }
         // The multiplier that leaves the least moment.
@@ -138,7 +138,7 @@ fn find(plan: &Plan, tendon: usize, bench: &mut Bench) -> Vec<Blind> {
     let width = plan.unknowns();
     let mut found = Vec::new();
     for (i, data) in plan.data.iter().enumerate() {
-        let rest = data.rest[..width].repeat(plan.settings.elements);
+        let rest = data.elasticity.rest()[..width].repeat(plan.settings.elements);
         let pieces = &plan.pieces[plan.starts[i]..plan.starts[i + 1]];
         for piece in pieces.iter().filter(|piece| piece.tendon == tendon) {
             bench.differentiate(plan, i, *piece, &rest);
@@ -157,10 +157,12 @@ impl Bench {
     /// it to first order.
     fn blind(&self, plan: &Plan, i: usize, piece: Piece) -> Option<Blind> {
         let size = plan.width();
-        let stiffness = |c: usize| plan.data[i].stiffness[c % plan.unknowns()];
+        let (elasticity, unknowns) = (&plan.data[i].elasticity, plan.unknowns());
+        let stiffness = |c: usize| elasticity.stiffness(c % unknowns);
         let matrix = DMatrix::from_fn(size, size, |a, b| {
             let (a, b) = (a.max(b), a.min(b));
-            let own = if a == b { stiffness(a) } else { 0.0 };
+            let same = a / unknowns == b / unknowns;
+            let own = if same { elasticity.rest_hessian(a % unknowns, b % unknowns) } else { 0.0 };
             (self.hessian[a * size + b] - own) / (stiffness(a) * stiffness(b)).sqrt()
         });
         let eigen = SymmetricEigen::new(matrix);

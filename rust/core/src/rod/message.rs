@@ -3,7 +3,6 @@
 use super::dual_newton::Ending;
 use super::model::{Rod, Scratch};
 use super::plan::Plan;
-use super::settings::TendonRule;
 
 /// The message for displacements (or none, where tensions were given); empty when the solve converged.
 pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Scratch) -> String {
@@ -28,11 +27,7 @@ pub(super) fn message(rod: &Rod<'_>, displacements: &[f64], work: &Scratch) -> S
         let stretch = plan.compliance[k] * state.tensions[k] / plan.unit;
         state.tendon_lengths[k] - stretch - plan.rest_lengths[k] - displacements[k]
     };
-    // A sliding tendon without tension may be slack.
-    let off = |k: usize| match plan.settings.tendons {
-        TendonRule::Sliding if state.tensions[k] == 0.0 => over(k).max(0.0),
-        _ => over(k).abs(),
-    };
+    let off = |k: usize| plan.settings.tendons.reported_excess(over(k), state.tensions[k]);
     let worst = (0..displacements.len())
         .filter(|k| displacements[*k].is_finite())
         .max_by(|a, b| off(*a).total_cmp(&off(*b)))

@@ -3,6 +3,7 @@
 pub mod contact;
 mod degenerate_rest;
 mod dual_newton;
+mod elasticity;
 pub(crate) mod element;
 pub(crate) mod equilibrium;
 mod message;
@@ -15,9 +16,11 @@ mod sensitivity;
 mod settings;
 pub(crate) mod stepwise_inverse;
 mod subsegment;
+mod tendon_law;
 mod tip_rates;
 
 pub use model::{Rod, Scratch};
 pub use plan::Plan;
 pub use sensitivity::{Change, Linearized, Sensitivity, Variation};
-pub use settings::{RodSettings, Subsegment, TendonRule};
+pub use settings::{RodSettings, Subsegment};
+pub use tendon_law::TendonLaw;

@@ -10,7 +10,7 @@ use super::dual_newton::{DualNewton, EASY, Ending};
 use super::message::message;
 use super::newton_system::{Chain, JUMP, Left};
 use super::plan::Plan;
-use super::settings::TendonRule;
+use super::tendon_law::Equations;
 use crate::error::InvalidInput;
 use crate::lie::Pose;
 use crate::model::{Model, Report, State};
@@ -96,10 +96,8 @@ impl<'r> Rod<'r> {
         tensions: &[f64],
         work: &mut Scratch,
     ) -> Result<Report, InvalidInput> {
-        if self.plan.settings.tendons == TendonRule::Proportional {
-            let expected = "sliding tendons where tensions are given";
-            return Err(InvalidInput::new("tendons", expected, "\"proportional\""));
-        }
+        let expected = "sliding tendons where tensions are given";
+        self.plan.settings.tendons.require_tensions("tendons", expected)?;
         self.plan.check_tensions(tensions)?;
         let mut budget = self.plan.settings.max_iterations;
         self.listen(work);
@@ -183,13 +181,15 @@ impl<'r> Rod<'r> {
         let plan = self.plan;
         work.chain.bound(plan, displacements);
         self.listen(work);
-        if plan.settings.tendons == TendonRule::Proportional {
-            return self.solve_pieces(displacements, work);
+        match plan.settings.tendons.equations() {
+            Equations::PerTendon => {
+                let mut budget = plan.settings.max_iterations;
+                let Scratch { ascent, chain, .. } = work;
+                (work.ending, work.left) = degenerate_rest::climb(ascent, plan, chain, &mut budget);
+                plan.settings.max_iterations - budget
+            }
+            Equations::PerPiece => self.solve_pieces(displacements, work),
         }
-        let mut budget = plan.settings.max_iterations;
-        let Scratch { ascent, chain, .. } = work;
-        (work.ending, work.left) = degenerate_rest::climb(ascent, plan, chain, &mut budget);
-        plan.settings.max_iterations - budget
     }
 
     /// The solved quantities, and how the solve ended.
@@ -249,16 +249,14 @@ pub(super) fn write_state(
         for strain in strains.chunks_exact(plan.unknowns()) {
             state.strains.push(Vector3::new(strain[0], strain[1], strain[2]));
             state.elongations.extend(strain.get(3));
-            for (c, strain) in strain.iter().enumerate() {
-                let off = strain - data.rest[c];
-                state.energy += 0.5 * data.stiffness[c] * off * off * plan.unit;
-            }
+            data.elasticity.add_energy(strain, &mut state.energy);
         }
         for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
             let length = (end.transform(&piece.to) - piece.from).norm();
             state.tendon_lengths[piece.tendon] += length;
         }
     }
+    state.energy *= plan.unit;
     state.tensions.extend(tensions.iter().map(|t| t * plan.unit));
 }
 

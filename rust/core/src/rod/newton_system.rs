@@ -92,7 +92,7 @@ impl Chain {
         let (width, elements) = (plan.unknowns(), plan.settings.elements);
         for data in &plan.data {
             for _ in 0..elements {
-                self.strains.extend_from_slice(&data.rest[..width]);
+                self.strains.extend_from_slice(&data.elasticity.rest()[..width]);
             }
         }
         self.tensions.clear();
@@ -197,10 +197,11 @@ impl Chain {
             loop {
                 self.local.place::<D>(kind, data, strains);
                 self.local.differentiate::<D, ONE>(data, pieces, strains, tensions, taut, &mut out);
-                let stable = factorize(out.hessian, &mut self.whole, size, data.stiffness[0]);
+                let stable =
+                    factorize(out.hessian, &mut self.whole, size, data.elasticity.bending());
                 let mut largest = 0.0_f64;
                 for (k, g) in out.gradient.iter().enumerate() {
-                    largest = largest.max(g.abs() / data.stiffness[k % D]);
+                    largest = largest.max(data.elasticity.strain_under(k % D, g.abs()));
                 }
                 round += 1;
                 let far = largest > balance || (!stable && largest > 1e-9);

@@ -47,7 +47,7 @@ impl Stage {
     /// Whether another subsegment bends in the same way between the same holes.
     pub(crate) fn alike(&self, other: &Self) -> bool {
         let (own, its) = (&self.part.data[0], &other.part.data[0]);
-        (own.length, own.stiffness, own.rest) == (its.length, its.stiffness, its.rest)
+        (own.length, own.elasticity) == (its.length, its.elasticity)
             && self.tendons == other.tendons
     }
 

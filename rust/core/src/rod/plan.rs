@@ -1,7 +1,9 @@
 //! What the rod model knows of a robot before any displacement, laid out for the loop.
 
-use super::settings::{RodSettings, TendonRule};
+use super::elasticity::Elasticity;
+use super::settings::RodSettings;
 use super::subsegment::{Data, Local, Piece};
+use super::tendon_law::{Equations, TendonLaw};
 use crate::error::InvalidInput;
 use crate::robot::{Robot, Tendon};
 
@@ -54,7 +56,6 @@ impl Plan {
             }
         }
         let (n, elements) = (backbone.subsegments(), settings.elements as f64);
-        let poisson = backbone.spec().poisson_ratio;
         let unit = backbone.bending_stiffness(0) / backbone.total_length();
         let mut data = Vec::with_capacity(n);
         let mut pieces = Vec::new();
@@ -62,12 +63,9 @@ impl Plan {
         let mut slenderness = 0.0_f64;
         for i in 0..n {
             let length = backbone.lengths()[i] / elements;
-            let bending = backbone.bending_stiffness(i) / (length * unit);
-            let axial = backbone.axial_stiffness(i).map_or(0.0, |ea| ea * length / unit);
-            let stiffness = [bending, bending, bending / (1.0 + poisson), axial];
-            let rest = backbone.rest(i) / elements;
-            data.push(Data { length, stiffness, rest: [rest.x, rest.y, rest.z, 0.0] });
-            slenderness = slenderness.max(elements * elements * length / bending);
+            let elasticity = Elasticity::new(backbone, i, length, elements, unit);
+            data.push(Data { length, elasticity });
+            slenderness = slenderness.max(elements * elements * length / elasticity.bending());
             starts.push(pieces.len());
             for (tendon, path) in robot.paths().iter().enumerate() {
                 if path.end() > i {
@@ -99,9 +97,10 @@ impl Plan {
             tendon.stiffness().map_or(0.0, |stiffness| length * unit / stiffness)
         };
         plan.compliance = robot.tendons().iter().zip(&plan.rest_lengths).map(give).collect();
-        if settings.tendons == TendonRule::Proportional {
-            plan.parts = (0..n).map(|i| plan.part(i)).collect();
-        }
+        plan.parts = match settings.tendons.equations() {
+            Equations::PerTendon => Vec::new(),
+            Equations::PerPiece => (0..n).map(|i| plan.part(i)).collect(),
+        };
         Ok(plan)
     }
 
@@ -110,7 +109,7 @@ impl Plan {
         let mut lengths = Vec::with_capacity(self.pieces.len());
         let mut local = Local::default();
         for (i, data) in self.data.iter().enumerate() {
-            let rest = data.rest[..3].repeat(self.settings.elements);
+            let rest = data.elasticity.rest()[..3].repeat(self.settings.elements);
             local.place::<3>(self.settings.subsegment, data, &rest);
             let end = local.end();
             let pieces = &self.pieces[self.starts[i]..self.starts[i + 1]];
@@ -137,7 +136,7 @@ impl Plan {
             compliance: compliance.collect(),
             piece_lengths: rest_lengths.clone(),
             rest_lengths,
-            slenderness: length * self.settings.elements as f64 / data.stiffness[0],
+            slenderness: length * self.settings.elements as f64 / data.elasticity.bending(),
             signed: true,
             parts: Vec::new(),
             unit: self.unit,
@@ -145,7 +144,7 @@ impl Plan {
     }
 
     /// How displacements are imposed.
-    pub(crate) fn tendon_rule(&self) -> TendonRule {
+    pub(crate) fn tendon_law(&self) -> TendonLaw {
         self.settings.tendons
     }
 
@@ -156,7 +155,12 @@ impl Plan {
 
     /// Moment that bends a subsegment by 1 rad, in this plan's unit \[m per unit of tension\].
     pub(crate) fn stiffness(&self, i: usize) -> f64 {
-        self.data[i].stiffness[0] / self.settings.elements as f64
+        self.data[i].elasticity.bending() / self.settings.elements as f64
+    }
+
+    /// Bend of a subsegment under one unit of moment \[rad\].
+    pub(super) fn bending_compliance(&self, i: usize) -> f64 {
+        self.settings.elements as f64 / self.data[i].elasticity.bending()
     }
 
     /// Rest length from base to tip \[m\].

@@ -1,5 +1,6 @@
 //! Choices of the rod model.
 
+use super::tendon_law::TendonLaw;
 use crate::error::InvalidInput;
 
 /// Kinematics of an element (design rule of the papers, or a rod's own).
@@ -26,37 +27,13 @@ impl Subsegment {
     }
 }
 
-/// How a displacement is imposed on a tendon that runs from hole to hole.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum TendonRule {
-    /// The total length is bounded; no friction. The multiplier is the tension.
-    #[default]
-    Sliding,
-    /// Every piece shrinks by the same ratio, as in the papers.
-    Proportional,
-}
-
-impl TendonRule {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Sliding, Self::Proportional];
-
-    /// The name used in Python.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Sliding => "sliding",
-            Self::Proportional => "proportional",
-        }
-    }
-}
-
 /// Choices of the rod model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RodSettings {
     /// Kinematics of an element.
     pub subsegment: Subsegment,
     /// How displacements are imposed.
-    pub tendons: TendonRule,
+    pub tendons: TendonLaw,
     /// Whether elements stretch; needs Young's modulus and diameter.
     pub axial: bool,
     /// Elements between two disks.
@@ -74,7 +51,7 @@ impl Default for RodSettings {
     fn default() -> Self {
         Self {
             subsegment: Subsegment::Arc,
-            tendons: TendonRule::Sliding,
+            tendons: TendonLaw::Sliding,
             axial: false,
             elements: 1,
             tolerance: 1e-11,

@@ -79,6 +79,7 @@ impl March {
         taut: &[bool],
     ) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let data = &plan.data[i];
+        let elasticity = &data.elasticity;
         let pieces = &plan.pieces[plan.starts[i]..plan.starts[i + 1]];
         let direction = wanted.try_normalize(0.0)?;
         let across = wanted.xy().norm();
@@ -95,7 +96,6 @@ impl March {
         self.hessian.resize(9, 0.0);
         self.rows.resize(3 * pieces.len(), 0.0);
         self.lengths.resize(pieces.len(), 0.0);
-        let torsion = data.stiffness[2];
         let mut before = f64::INFINITY;
         for _ in 0..STEPS {
             self.local.place::<3>(plan.settings.subsegment, data, strain.as_slice());
@@ -114,7 +114,7 @@ impl March {
                 &mut out,
             );
             // Slopes of energy and tendons count from this subsegment's own rest twist: from the wanted one.
-            let off = (gradient[2] + torsion * (data.rest[2] - twist)) / torsion;
+            let off = elasticity.strain_under(2, elasticity.with_rest(2, gradient[2], twist));
             let node = &self.local.nodes[0];
             let end = self.local.end().translation / data.length;
             let residual = Vector3::new(first.dot(&end), second.dot(&end), off);
@@ -124,7 +124,7 @@ impl March {
             }
             // At rounding the residual no longer falls.
             if size <= MET || (size < 1e-13 && size >= 0.5 * before) {
-                let rest = Vector3::from_fn(|c, _| gradient[c] / data.stiffness[c] + data.rest[c]);
+                let rest = Vector3::from_fn(|c, _| elasticity.balanced_rest(c, gradient[c]));
                 return Some((strain, Vector3::new(rest.x, rest.y, twist)));
             }
             before = size;
@@ -133,7 +133,7 @@ impl March {
             let jacobian = Matrix3::from_rows(&[
                 first.transpose() * sweep,
                 second.transpose() * sweep,
-                Vector3::new(h[6], h[7], h[8]).transpose() / torsion,
+                Vector3::new(h[6], h[7], h[8]).map(|h| elasticity.strain_under(2, h)).transpose(),
             ]);
             let step = jacobian.try_inverse()? * residual;
             let share = 1.0_f64.min(0.5 / step.amax().max(f64::MIN_POSITIVE));

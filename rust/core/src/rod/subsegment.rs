@@ -5,6 +5,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::elasticity::Elasticity;
 use super::element::Element;
 use super::settings::Subsegment;
 use crate::lie::Pose;
@@ -23,10 +24,8 @@ pub(super) struct Piece {
 pub(super) struct Data {
     /// Rest length of an element \[m\].
     pub(super) length: f64,
-    /// Stiffness of an element by its unknowns: bending, bending, torsion, elongation.
-    pub(super) stiffness: [f64; 4],
-    /// Rest strain of an element \[rad\], and no elongation.
-    pub(super) rest: [f64; 4],
+    /// Elasticity of an element.
+    pub(super) elasticity: Elasticity,
 }
 
 /// Values and derivatives at a point, in slices of the caller's arrays.
@@ -167,15 +166,15 @@ impl Local {
         taut: &[bool],
         out: &mut Derivatives<'_>,
     ) {
-        let size = if ONE { D } else { D * self.nodes.len() };
+        let count = if ONE { 1 } else { self.nodes.len() };
+        let size = D * count;
         for (e, node) in self.nodes.iter_mut().enumerate() {
             node.set_velocities::<D>(e == 0);
         }
         out.hessian.fill(0.0);
-        for k in 0..size {
-            let c = k % D;
-            out.gradient[k] = data.stiffness[c] * (strains[k] - data.rest[c]);
-            out.hessian[k * (size + 1)] = data.stiffness[c];
+        for e in 0..count {
+            let elasticity = &data.elasticity;
+            elasticity.differentiate::<D>(strains, D * e, size, out.gradient, out.hessian);
         }
         let mut pulled = false;
         for (p, piece) in pieces.iter().enumerate() {
@@ -300,16 +299,16 @@ impl Local {
         strains: &[f64],
         tensions: &[f64],
     ) -> f64 {
-        let energy = strains
-            .iter()
-            .enumerate()
-            .map(|(k, strain)| 0.5 * data.stiffness[k % D] * (strain - data.rest[k % D]).powi(2));
+        let mut energy = 0.0;
+        for strain in strains.chunks_exact(D) {
+            data.elasticity.add_energy(strain, &mut energy);
+        }
         let end = self.end();
         let work = pieces
             .iter()
             .filter(|piece| tensions[piece.tendon] != 0.0)
             .map(|p| tensions[p.tendon] * (end.transform(&p.to) - p.from).norm());
-        energy.sum::<f64>() + work.sum::<f64>()
+        energy + work.sum::<f64>()
     }
 
     /// Moves by a share of the Newton step of factored derivatives that lowers the value, and returns how

@@ -3,11 +3,11 @@
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
-use tdcr::rod::{self, Subsegment, TendonRule};
+use tdcr::rod::{self, Subsegment, TendonLaw};
 
 use crate::settings::fields::{Count, Flag, Float, Kind, OneOf, Unsigned, choices, settings_class};
 
-choices!(["", " or "]; Subsegment, TendonRule);
+choices!(["", " or "]; Subsegment, TendonLaw);
 
 settings_class! {
     /// Choices of the rod model.
@@ -21,7 +21,7 @@ settings_class! {
         ///     How a displacement is imposed. "sliding": the total length of a tendon is bounded and it slides
         ///     without friction. "proportional": every piece between two disks shrinks by the same ratio, as in
         ///     the papers.
-        tendons: OneOf<TendonRule> = "sliding",
+        tendons: OneOf<TendonLaw> = "sliding",
             "How displacements are imposed: \"sliding\" or \"proportional\".";
 
         /// elements : int, optional

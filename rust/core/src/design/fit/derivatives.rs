@@ -200,7 +200,7 @@ mod tests {
     use crate::design::fit::parameters::Parameters;
     use crate::design::{FitModel, FitSettings, Measured, fit};
     use crate::robot::{Backbone, BackboneSpec, PerDisk, Routing, Tendon};
-    use crate::rod::{RodSettings, TendonRule};
+    use crate::rod::{RodSettings, TendonLaw};
 
     const BASE: Matrix4<f64> = Matrix4::new(
         0.0, 0.0, 1.0, 0.1, //
@@ -308,7 +308,7 @@ mod tests {
         let given = [-0.004, -0.003, -0.006, f64::INFINITY, 0.001, -0.006];
         let measured = at_origin(&robot, &given, 9);
         let kinds = [Parameter::Stiffness, Parameter::Offset];
-        for tendons in [TendonRule::Sliding, TendonRule::Proportional] {
+        for tendons in [TendonLaw::Sliding, TendonLaw::Proportional] {
             let settings = RodSettings { tendons, ..RodSettings::default() };
             // By forward passes and by adjoint ones.
             compare(&robot, FitModel::Rod(settings), &kinds, &measured);

@@ -1,7 +1,7 @@
 //! Choices of a routing design.
 
 use crate::error::InvalidInput;
-use crate::rod::{RodSettings, TendonRule};
+use crate::rod::RodSettings;
 
 /// Choices of a routing design.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,10 +51,8 @@ impl RoutingSettings {
     pub fn validate(&self) -> Result<(), InvalidInput> {
         // The rod model.
         self.rod.validate()?;
-        if self.rod.tendons == TendonRule::Proportional {
-            let expected = "\"sliding\" (a proportional piece depends on the whole routing)";
-            return Err(InvalidInput::new("rod.tendons", expected, "\"proportional\""));
-        }
+        let expected = "\"sliding\" (a proportional piece depends on the whole routing)";
+        self.rod.tendons.require_tensions("rod.tendons", expected)?;
         // Holes, by number or of any azimuth.
         if let Some(holes) = self.holes
             && !(1..=MOST_HOLES).contains(&holes)

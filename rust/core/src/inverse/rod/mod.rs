@@ -28,7 +28,7 @@ use crate::robot::Robot;
 use crate::rod::contact::{self, LoadedRod, Scene};
 use crate::rod::equilibrium::FreeRod;
 use crate::rod::equilibrium::{ContactRod, Equilibrium};
-use crate::rod::{self, Plan, Rod, TendonRule};
+use crate::rod::{self, Plan, Rod};
 use crate::solve::convex_region::Region;
 use crate::status::Status;
 pub use disk_positions::PositionsAnswer;
@@ -139,10 +139,7 @@ impl<'a> RodInverse<'a> {
         settings: InverseSettings,
     ) -> Result<Self, InvalidInput> {
         settings.validate()?;
-        if plan.tendon_rule() == TendonRule::Proportional {
-            let expected = "sliding tendons for an inverse";
-            return Err(InvalidInput::new("settings.tendons", expected, "\"proportional\""));
-        }
+        plan.tendon_law().require_tensions("settings.tendons", "sliding tendons for an inverse")?;
         bounds.check_rod(robot.tendons().len())?;
         let rest = FreeRod::new(Rod::new(robot, plan));
         let length = robot.backbone().total_length();

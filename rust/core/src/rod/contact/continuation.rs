@@ -202,8 +202,8 @@ fn contact_gives(plan: &Plan, out: &mut Vec<f64>) {
     let (mut s, mut sums) = (0.0, [0.0; 3]);
     for i in 0..=plan.data.len() {
         out.push(GIVE * (s * s * sums[0] - 2.0 * s * sums[1] + sums[2]));
-        if let Some(data) = plan.data.get(i) {
-            let (l, bends) = (plan.length(i), plan.settings.elements as f64 / data.stiffness[0]);
+        if i < plan.data.len() {
+            let (l, bends) = (plan.length(i), plan.bending_compliance(i));
             let middle = s + 0.5 * l;
             for (sum, power) in sums.iter_mut().zip([1.0, middle, middle * middle]) {
                 *sum += power * bends;

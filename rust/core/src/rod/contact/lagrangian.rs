@@ -223,9 +223,8 @@ impl Lagrangian {
             frame = frame.compose(&end);
             self.frames.push(frame);
             self.ends.push(end);
-            for (k, strain) in strains.iter().enumerate() {
-                let off = strain - data.rest[k % D];
-                self.value += 0.5 * data.stiffness[k % D] * off * off;
+            for strain in strains.chunks_exact(D) {
+                data.elasticity.add_energy(strain, &mut self.value);
             }
             for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
                 self.over[piece.tendon] += (end.transform(&piece.to) - piece.from).norm();

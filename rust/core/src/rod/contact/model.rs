@@ -17,7 +17,6 @@ use crate::rod::dual_newton::Ending;
 use crate::rod::model::{Rod, read_state, told, write_state};
 use crate::rod::newton_system::Chain;
 use crate::rod::plan::Plan;
-use crate::rod::settings::TendonRule;
 use crate::status::Status;
 
 /// Contacts are listed up to this gap, in shares of the robot's length.
@@ -64,10 +63,8 @@ impl<'r> LoadedRod<'r> {
     /// # Errors
     /// `InvalidInput` for proportional tendons, which leave contacts no freedom.
     pub fn new(robot: &'r Robot, plan: &'r Plan, scene: &'r Scene) -> Result<Self, InvalidInput> {
-        if plan.settings.tendons == TendonRule::Proportional {
-            let expected = "\"sliding\" among obstacles or under loads";
-            return Err(InvalidInput::new("tendons", expected, "\"proportional\""));
-        }
+        let expected = "\"sliding\" among obstacles or under loads";
+        plan.settings.tendons.require_tensions("tendons", expected)?;
         let lengths = (0..plan.data.len()).map(|i| plan.length(i));
         let shortest = lengths.fold(f64::INFINITY, f64::min);
         Ok(Self { rod: Rod::new(robot, plan), scene, shortest })

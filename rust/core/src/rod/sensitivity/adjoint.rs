@@ -3,7 +3,7 @@
 use nalgebra::{DVector, Vector3, Vector6};
 
 use super::{Change, Line, Sensitivity};
-use crate::rod::settings::TendonRule;
+use crate::rod::elasticity::StiffnessChange;
 use crate::rod::subsegment::Local;
 
 impl Sensitivity<'_> {
@@ -75,18 +75,17 @@ impl Sensitivity<'_> {
             let strains = &self.at.strains[i * size..(i + 1) * size];
             let w = &w[i * size..(i + 1) * size];
             local.prepare::<D>(plan.settings.subsegment, data, strains);
-            let mut share = 0.0;
+            let (elasticity, mut stiffness) = (&data.elasticity, StiffnessChange::default());
             for (k, w) in w.iter().enumerate() {
                 let c = k % D;
-                let bent = w * data.stiffness[c] * (strains[k] - data.rest[c]);
-                share += if c == 3 { -bent } else { bent };
-                if c == 2 {
-                    out.poisson_ratio += bent / (1.0 + self.poisson_ratio());
-                }
+                elasticity.subtract_weighted_moment(c, strains[k], *w, &mut stiffness);
                 if c < 3 {
-                    out.rest[i][c] += w * data.stiffness[c] / plan.settings.elements as f64;
+                    let elements = plan.settings.elements as f64;
+                    out.rest[i][c] += elasticity.moment_by_rest(c, *w) / elements;
                 }
             }
+            out.poisson_ratio += stiffness.shear / (1.0 + self.poisson_ratio());
+            let mut share = stiffness.length;
             for p in plan.starts[i]..plan.starts[i + 1] {
                 let piece = &plan.pieces[p];
                 let pull = self.at.equations[p].map_or(0.0, |row| t[row]);
@@ -96,7 +95,12 @@ impl Sensitivity<'_> {
                 out.holes[piece.tendon][i + 1] += by.to;
                 share += by.share;
                 if self.at.equations[p].is_some() {
-                    self.contract_bound(p, i, pull, &mut weights, &mut whole, out);
+                    let bound = self.piece_bound(p);
+                    let by = plan.settings.tendons.bound_weights(&bound, pull);
+                    weights[p] += by.piece;
+                    whole[piece.tendon] += by.tendon;
+                    out.displacements[piece.tendon] += by.displacement;
+                    out.stiffness[piece.tendon] -= by.strain * bound.strain;
                 }
             }
             out.lengths[i] += share / plan.length(i);
@@ -107,43 +111,12 @@ impl Sensitivity<'_> {
         self.contract_rest::<D>(&weights, out);
     }
 
-    /// Adds `t·db`: weights of the rest lengths of the pieces, and of the whole tendons.
-    fn contract_bound(
-        &self,
-        p: usize,
-        i: usize,
-        pull: f64,
-        weights: &mut [f64],
-        whole: &mut [f64],
-        out: &mut Change,
-    ) {
-        let plan = self.plan();
-        let k = plan.pieces[p].tendon;
-        let give = plan.compliance[k] / plan.rest_lengths[k] * self.at.tensions[p];
-        match plan.settings.tendons {
-            TendonRule::Sliding if i == 0 => {
-                whole[k] += pull * (1.0 + give);
-                out.displacements[k] += pull;
-                out.stiffness[k] -= pull * give * plan.rest_lengths[k];
-            }
-            TendonRule::Sliding => {}
-            TendonRule::Proportional => {
-                let (length, d) = (plan.rest_lengths[k], self.at.displacements[k]);
-                weights[p] += pull * (1.0 + d / length + give);
-                out.stiffness[k] -= pull * give * plan.piece_lengths[p];
-                let share = pull * plan.piece_lengths[p] / length;
-                out.displacements[k] += share;
-                whole[k] -= share * d / length;
-            }
-        }
-    }
-
     /// Adds the gradient of weighted rest lengths of the pieces.
     fn contract_rest<const D: usize>(&self, weights: &[f64], out: &mut Change) {
         let plan = self.plan();
         let mut local = Local::default();
         for (i, data) in plan.data.iter().enumerate() {
-            let rest = data.rest[..D].repeat(plan.settings.elements);
+            let rest = data.elasticity.rest()[..D].repeat(plan.settings.elements);
             local.prepare::<D>(plan.settings.subsegment, data, &rest);
             let end = local.end();
             for p in plan.starts[i]..plan.starts[i + 1] {

@@ -13,8 +13,8 @@ use nalgebra::{DMatrix, DVector, Matrix6xX, Vector3};
 
 use super::model::{Rod, Scratch};
 use super::plan::Plan;
-use super::settings::TendonRule;
 use super::subsegment::{Local, Piece};
+use super::tendon_law::{Equations, PieceBound};
 use super::tip_rates::{Solved, Sweep};
 use crate::lie::Pose;
 use crate::solve::dense::{backward, dot, forward};
@@ -101,10 +101,9 @@ impl<'r> Rod<'r> {
             count: 0,
             dependent: false,
         };
-        if self.plan.settings.tendons == TendonRule::Proportional {
-            at.assemble_pieces(self.plan, work);
-        } else {
-            at.assemble_whole(self.plan, work);
+        match self.plan.settings.tendons.equations() {
+            Equations::PerTendon => at.assemble_whole(self.plan, work),
+            Equations::PerPiece => at.assemble_pieces(self.plan, work),
         }
         self.sensitivity_at(Arc::new(at))
     }
@@ -135,7 +134,7 @@ impl Linearized {
         for (i, data) in plan.data.iter().enumerate() {
             for p in plan.starts[i]..plan.starts[i + 1] {
                 let length = plan.piece_lengths[p];
-                most[plan.pieces[p].tendon] += length * length / data.stiffness[0];
+                most[plan.pieces[p].tendon] += length * length / data.elasticity.bending();
             }
         }
         let count = taut.len();
@@ -247,14 +246,17 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// What a displacement does to the bound of a piece's equation.
-    fn bound_slope(&self, piece: usize) -> f64 {
+    /// Numbers of the bound of a piece's equation.
+    fn piece_bound(&self, p: usize) -> PieceBound {
         let plan = self.plan();
-        match plan.settings.tendons {
-            TendonRule::Sliding => 1.0,
-            TendonRule::Proportional => {
-                plan.piece_lengths[piece] / plan.rest_lengths[plan.pieces[piece].tendon]
-            }
+        let k = plan.pieces[p].tendon;
+        let tendon = plan.rest_lengths[k];
+        PieceBound {
+            first: p < plan.starts[1],
+            piece: plan.piece_lengths[p],
+            tendon,
+            displacement: self.at.displacements[k],
+            strain: plan.compliance[k] / tendon * self.at.tensions[p],
         }
     }
 
@@ -298,7 +300,8 @@ impl Sensitivity<'_> {
         let mut bounds = DMatrix::zeros(self.at.count, self.at.displacements.len());
         for (p, piece) in plan.pieces.iter().enumerate() {
             if let Some(row) = self.at.equations[p] {
-                bounds[(row, piece.tendon)] = self.bound_slope(p);
+                let (own, tendon) = (plan.piece_lengths[p], plan.rest_lengths[piece.tendon]);
+                bounds[(row, piece.tendon)] = plan.settings.tendons.bound_slope(own, tendon);
             }
         }
         let mut out = Matrix6xX::zeros(self.at.displacements.len());

@@ -3,8 +3,9 @@
 use nalgebra::{DVector, Vector3};
 
 use super::{Change, Line, Sensitivity, Variation};
-use crate::rod::settings::TendonRule;
+use crate::rod::elasticity::StiffnessChange;
 use crate::rod::subsegment::Local;
+use crate::rod::tendon_law::BoundRate;
 
 impl Sensitivity<'_> {
     /// What a change does to the shape, its sizes those of [`Sensitivity::no_change`].
@@ -33,12 +34,13 @@ impl Sensitivity<'_> {
             let share = change.lengths[i] / plan.length(i);
             let own = &mut right[i * size..(i + 1) * size];
             let count = plan.settings.elements as f64;
+            let shear = change.poisson_ratio / (1.0 + self.poisson_ratio());
+            let stiffness = StiffnessChange { length: share, shear };
             for (k, own) in own.iter_mut().enumerate() {
                 let c = k % D;
-                let bent = data.stiffness[c] * (strains[k] - data.rest[c]);
-                *own -= bent * self.stiffness_share(c, share, change.poisson_ratio);
+                *own -= data.elasticity.moment_by_stiffness(c, strains[k], stiffness);
                 if c < 3 {
-                    *own += data.stiffness[c] * change.rest[i][c] / count;
+                    *own += data.elasticity.moment_by_rest(c, change.rest[i][c]) / count;
                 }
             }
             for p in plan.starts[i]..plan.starts[i + 1] {
@@ -62,46 +64,19 @@ impl Sensitivity<'_> {
                 }
                 if let Some(row) = self.at.equations[p] {
                     lengths[row] -= at.direction.dot(&moved);
-                    if plan.settings.tendons == TendonRule::Proportional {
-                        lengths[row] += self.bound_change(p, rest[p], whole[piece.tendon], change);
-                    } else if i == 0 {
-                        let whole = whole[piece.tendon];
-                        lengths[row] += self.bound_change(p, whole, whole, change);
-                    }
+                    let bound = self.piece_bound(p);
+                    let rate = BoundRate {
+                        piece: rest[p],
+                        tendon: whole[piece.tendon],
+                        displacement: change.displacements[piece.tendon],
+                        strain: -bound.strain * change.stiffness[piece.tendon],
+                    };
+                    lengths[row] += plan.settings.tendons.bound_rate(&bound, &rate);
                 }
             }
         }
         self.solve(&mut right, &mut lengths);
         self.variation::<D>(right, &lengths, change)
-    }
-
-    /// Relative change of a stiffness.
-    fn stiffness_share(&self, c: usize, share: f64, poisson_ratio: f64) -> f64 {
-        match c {
-            2 => -share - poisson_ratio / (1.0 + self.poisson_ratio()),
-            3 => share,
-            _ => -share,
-        }
-    }
-
-    /// Change of the bound of an equation, elasticity of the tendon included, for changes of the rest lengths
-    /// of its own part and of the whole tendon.
-    fn bound_change(&self, p: usize, own: f64, whole: f64, change: &Change) -> f64 {
-        let plan = self.plan();
-        let k = plan.pieces[p].tendon;
-        let give = plan.compliance[k] / plan.rest_lengths[k] * self.at.tensions[p];
-        match plan.settings.tendons {
-            TendonRule::Sliding => {
-                let stretch = give * plan.rest_lengths[k];
-                own * (1.0 + give) + change.displacements[k] - stretch * change.stiffness[k]
-            }
-            TendonRule::Proportional => {
-                let (length, d) = (plan.rest_lengths[k], self.at.displacements[k]);
-                let ratio = (change.displacements[k] - d * whole / length) / length;
-                let ratio = ratio - give * change.stiffness[k];
-                own * (1.0 + d / length + give) + plan.piece_lengths[p] * ratio
-            }
-        }
     }
 
     /// Change of the rest length of every piece.
@@ -110,7 +85,7 @@ impl Sensitivity<'_> {
         let mut out = Vec::with_capacity(plan.pieces.len());
         let mut local = Local::default();
         for (i, data) in plan.data.iter().enumerate() {
-            let rest = data.rest[..D].repeat(plan.settings.elements);
+            let rest = data.elasticity.rest()[..D].repeat(plan.settings.elements);
             local.prepare::<D>(plan.settings.subsegment, data, &rest);
             let end = local.end();
             let share = change.lengths[i] / plan.length(i);

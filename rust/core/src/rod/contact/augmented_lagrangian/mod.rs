@@ -351,7 +351,8 @@ impl Descent {
         let (width, data) = (plan.width(), &plan.data);
         let mut size = 0.0;
         for (k, escape) in self.escape.iter().enumerate() {
-            size += escape * escape * data[k / width].stiffness[k % width % plan.unknowns()];
+            let elasticity = &data[k / width].elasticity;
+            size += escape * escape * elasticity.stiffness(k % width % plan.unknowns());
         }
         dot(&self.slope, &self.escape).abs() <= SYMMETRIC * size
     }

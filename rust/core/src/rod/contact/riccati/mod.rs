@@ -109,8 +109,8 @@ impl Sweep {
                 .zip(&mut *coupling)
                 .zip(self.gradient[range.clone()].iter().enumerate())
             {
-                let data = &plan.data[i];
-                self.moment = self.moment.max(slope.abs() / data.stiffness[k % D]);
+                let elasticity = &plan.data[i].elasticity;
+                self.moment = self.moment.max(elasticity.strain_under(k % D, slope.abs()));
                 if slope.is_nan() {
                     self.moment = f64::NAN;
                 }
@@ -134,9 +134,9 @@ impl Sweep {
                         factor[a * size + b] += other * mixed[k].dot(&twists[a]);
                     }
                 }
-                factor[a * (size + 1)] += at.shift * plan.data[i].stiffness[a % D];
+                factor[a * (size + 1)] += at.shift * plan.data[i].elasticity.stiffness(a % D);
             }
-            self.factor_block(i, size, plan.data[i].stiffness[0]);
+            self.factor_block(i, size, plan.data[i].elasticity.bending());
             let factor = &self.factors[i * size * size..(i + 1) * size * size];
             let growing = &mut self.growing[i * size * count..(i + 1) * size * count];
             let coupling = &mut self.coupling[range.clone()];
