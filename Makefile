@@ -42,7 +42,7 @@ help:
 demo: $(VENV)/installed
 	$(BIN)/tdcr demo --output demo
 
-test: tools rust-checks rust-tests package python-checks python-tests guide runs
+test: tools rust-checks rust-tests package python-checks python-tests runs
 	@echo "all checks passed"
 
 # Says what is missing before anything starts.
@@ -89,6 +89,7 @@ rust-checks: tools
 rust-tests: tools
 	cargo test --locked
 	cargo test --locked --benches
+	cargo run --locked --quiet --profile test --example bend_and_back
 
 # The sdist, and the wheel that pip makes of it, which the Python tests use: so it holds all it needs. Files that are as
 # they were keep their time, so that cargo compiles no more than what changed.

@@ -120,9 +120,13 @@ const CASES: [Case; 5] = [
 
 fn main() {
     let given: Vec<String> = args().skip(1).collect();
+    // Cargo adds options of its own, which name no case.
     let case = CASES.iter().find(|(name, _)| given.first().is_some_and(|first| first == name));
-    match case {
-        Some((_, run)) => run(given[1].parse().unwrap()),
-        None => CASES.iter().for_each(|(_, run)| run(1)),
+    if let Some((_, run)) = case {
+        run(given[1].parse().unwrap());
+    } else {
+        for (_, run) in CASES {
+            run(1);
+        }
     }
 }

@@ -17,6 +17,7 @@ import platform
 import re
 import subprocess
 import sys
+import textwrap
 from collections import defaultdict
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -156,7 +157,7 @@ def page(target: Path, quick: bool) -> str:
     return PAGE.format(
         kind=SHORT if quick else FULL,
         day=datetime.fromtimestamp(started, tz=UTC).date().isoformat(),
-        machine=machine(),
+        machine=textwrap.fill(machine(), 108, subsequent_indent="  ", break_long_words=False),
         load=load(),
         core="\n".join(core_table(groups)),
         side="\n".join(line for path in printed for line in side_by_side(path)),

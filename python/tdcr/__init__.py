@@ -52,7 +52,8 @@ from tdcr._core import __version__ as __version__
 from tdcr._forward.batch import ShapeBatch, forward_batch
 from tdcr._forward.sensitivity import Gradient, Variation
 from tdcr._forward.sweep import Sweep, sweep
-from tdcr._gripper.gripper import Grasp, Gripper
+from tdcr._gripper.grasp import Grasp
+from tdcr._gripper.gripper import Gripper
 from tdcr._inverse.solve import (
     Inverse,
     InverseBatch,

@@ -47,7 +47,6 @@ __all__ = [
     "_forward_batch",
     "_inverse",
     "_inverse_batch",
-    "_inverse_places",
     "_inverse_solutions",
     "_planar_cable_lengths",
     "_planar_clearance",
@@ -793,22 +792,8 @@ def _chained_shape(
 ) -> Shape: ...
 def _inverse(
     robot: Robot,
-    target: ArrayLike,
-    model: str,
-    start: ArrayLike | None,
-    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,
-    settings: RodSettings | LinkageSettings | ConstantCurvatureSettings | None,
-    search: InverseSettings | None,
-    method: str,
-    obstacles: Iterable[Obstacle] | Obstacle,
-    loads: Loads | None,
-) -> tuple[
-    tuple[_Array, _Array, Status, str, float, float, int, int],
-    Shape | None,
-]: ...
-def _inverse_places(
-    robot: Robot,
-    positions: ArrayLike,
+    target: ArrayLike | None,
+    positions: ArrayLike | None,
     model: str,
     start: ArrayLike | None,
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None,

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from tdcr import _core
-from tdcr._base.value import rebuilt
+from tdcr._base.value import rebuild
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class ArcFit(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy with arrays that stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)
 
 
 def arc_from_displacements(

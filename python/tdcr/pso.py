@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tdcr import _core
-from tdcr._base.progress import told
+from tdcr._base.progress import progress_callback
 from tdcr._base.status import Status
 from tdcr._base.value import Value
 from tdcr._core import PsoSettings
@@ -51,9 +51,9 @@ class PsoResult(Value):
     it ended above its target, or by a budget or the callback. numerical_error: no evaluation gave a
     value below infinity."""
     stop: str
-    """What ended the run: "target", "stagnation", "iterations", "evaluations" or "callback"."""
+    """Reason why it ended: "target", "stagnation", "iterations", "evaluations" or "callback"."""
     message: str
-    """What stood in the way; empty when it converged."""
+    """Reason why it did not converge; empty when it converged."""
     iterations: int
     """Moves of the whole swarm."""
     evaluations: int
@@ -67,7 +67,7 @@ class PsoResult(Value):
 
     @property
     def ok(self) -> bool:
-        """Whether it converged."""
+        """True if it converged."""
         return self.status is Status.converged
 
     def require(self) -> PsoResult:
@@ -141,7 +141,7 @@ def minimize(
         raise TypeError(f"f: expected a callable, got {type(f).__name__}")
     if callback is not None and not callable(callback):
         raise TypeError(f"callback: expected a callable, got {type(callback).__name__}")
-    with told(progress, "minimize", settings.max_iterations) as tell:
+    with progress_callback(progress, "minimize", settings.max_iterations) as tell:
         fields = _core._pso_minimize(
             f,
             lower,

@@ -101,8 +101,62 @@ def inverse(target, **options):
     return tdcr.inverse(straight(), target, model="constant_curvature", **options)
 
 
+def finger():
+    return tdcr.Robot(tdcr.Backbone(0.12, 6), [tdcr.Tendon(0.0, 0.008), tdcr.Tendon(2.0, 0.008)])
+
+
+def measured(robot=None, count=12):
+    """Displacements and tips of a robot with other gains than the given one."""
+    rows = np.random.default_rng(2).uniform(-0.004, 0.0, (count, 2))
+    tips = tdcr.forward_batch(finger() if robot is None else robot, rows * [1.1, 0.9]).tip
+    return rows, tips[:, :3, 3].copy()
+
+
+def fit(parameters=("gain",), **options):
+    rows, tips = measured()
+    tips[3] = np.nan
+    return tdcr.design.fit(finger(), tips, parameters, displacements=rows, **options)
+
+
+def wanted():
+    return tdcr.forward(finger(), [-0.004, 0.002]).positions[1:]
+
+
+def prebend(**options):
+    return tdcr.design.prebend(finger(), wanted(), [-0.002, np.inf], **options)
+
+
+def routing(**options):
+    settings = tdcr.RoutingSettings(beam_width=8, **options)
+    return tdcr.design.routing(
+        finger(), wanted(), bounds=(-0.006, [0.01, np.inf]), settings=settings
+    )
+
+
+def grasp(**options):
+    finger = tdcr.Robot(tdcr.Backbone(0.18, 9), [tdcr.Tendon(0.0, 0.008)], name="claw")
+    gripper = tdcr.Gripper.around(finger, 3, 0.06)
+    ball, wall = tdcr.Sphere((0, 0, 0.14), 0.04), tdcr.HalfSpace((0, 0, -0.1), (0, 0, 1))
+    return gripper.close([-0.003], [ball, wall], steps=4, **options)
+
+
+DESIGNS = {
+    "prebend": prebend,
+    "prebend among obstacles": lambda: prebend(obstacles=tdcr.Sphere((0.2, 0, 0), 0.05)),
+    "routing": routing,
+    "routing of any azimuth": lambda: routing(holes=None),
+    "fit": fit,
+    "fit of all": lambda: fit(("offset", "radius", "azimuth", "rest", "base"), seed=2**70),
+    "fit without validation": lambda: fit(validation=0.0),
+    "grasp": grasp,
+    "grasp of a finger": lambda: tdcr.Grasp(
+        grasp().shares[-1:], ((tdcr.forward(straight(), [0, 0, 0]),),)
+    ),
+}
+
 RESULTS = {
     **SHAPES,
+    **DESIGNS,
     "batch": batch,
     "warm batch": lambda: batch(warm=True),
     "linkage batch": lambda: batch(model="linkage"),

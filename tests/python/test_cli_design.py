@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -40,6 +41,10 @@ def test_prebend_writes_the_robot_that_takes_the_shape(robot, tmp_path, capsys):
     data = json.loads(run(capsys, *command, "--json")[0])
     assert data["status"] == "converged"
     assert max(data["error"]) < 1e-9
+    run(capsys, *command, "--json", "found.json")
+    found = design.Prebend.load("found.json")
+    assert (found.robot, found.shape) == (designed, tdcr.forward(designed, [-0.003]))
+    assert found.error.tolist() == data["error"]
 
 
 def test_prebend_of_a_curve(robot, tmp_path, capsys):
@@ -69,6 +74,11 @@ def test_routing_writes_holes_and_says_pulls(robot, tmp_path, capsys):
     data = json.loads(run(capsys, *command, "--json")[0])
     assert data["displacements"] == pytest.approx([-0.004], abs=1e-8)
     assert data["holes"] == [[0, 1, 1, 2, 2]]
+    run(capsys, *command, "--json", "found.json")
+    found = design.Routing.load("found.json")
+    assert (found.holes, found.robot) == (((0, 1, 1, 2, 2),), tdcr.Robot.load("routed.toml"))
+    assert found.settings == tdcr.RoutingSettings(holes=6)
+    assert found.shape == tdcr.forward(found.robot, found.displacements)
 
 
 @pytest.fixture
@@ -103,6 +113,10 @@ def test_fit_prints_parameters_and_writes_the_robot(measured, tmp_path, capsys):
     assert data["parameters"]["gain"] == by_hand.parameters["gain"].tolist()
     assert data["rms_validation"] == by_hand.rms()
     assert data["dropped"] == 1
+    run(capsys, *measured, *options, "--json", "fit.json")
+    loaded = design.Fit.load("fit.json")
+    assert loaded.dropped == 1  # Of the file; those of the fit were without gaps.
+    assert replace(loaded, dropped=0) == by_hand
 
 
 def test_the_picture_of_a_fit_of_few_rows_shows_every_step(measured):

@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 from command_line import PULL, arm, picture, run, save_arm
+from saved_results import DESIGNS
 
 import tdcr
 from tdcr._cli import main
@@ -26,11 +27,14 @@ def test_plot_draws_whatever_was_saved(robot, tmp_path, capsys):
     limits = [(-0.01, 0), (math.inf,) * 2, (math.inf,) * 2]
     tdcr.workspace(arm(), limits, 20, sampling="grid").save("cloud.npz")
     tdcr.forward_batch(arm(), [PULL, PULL]).save("batch.npz")
+    for name in ("prebend", "routing", "fit", "grasp"):
+        DESIGNS[name]().save(f"{name}.npz")
     arm().save("arm.json")
     for file, *options in (
         ("shape.npz", "--view", "3d"), ("shape.json",), ("inverse.npz",), ("cloud.npz",),
         ("cloud.npz", "--view", "3d"), ("batch.npz", "--row", "1"), ("arm.json",),
         (robot, "--pull", "-10 free free", "--unit", "mm", "--model", "linkage"),
+        ("prebend.npz",), ("routing.npz",), ("fit.npz",), ("grasp.npz",),
     ):  # fmt: skip
         (tmp_path / "p.png").unlink(missing_ok=True)
         main(["plot", file, "--output", "p.png", *options])

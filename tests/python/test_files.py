@@ -17,8 +17,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdcr import Backbone, InvalidInput, Robot, Tendon
+from tdcr._io.lengths import metres
 from tdcr._io.robot_file import load_robot, robot_schema, save_robot
-from tdcr._io.robot_schema import BackboneTable, metres
+from tdcr._io.robot_schema import BackboneTable
 
 GOOD = """
 format = 1

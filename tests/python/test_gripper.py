@@ -10,7 +10,7 @@ from example_scripts import example_script
 
 import tdcr
 from tdcr._gripper.force_closure import positively_span, wrenches
-from tdcr._gripper.placing import turned
+from tdcr._gripper.placing import least_turn
 
 BALL = tdcr.Sphere((0, 0, 0.14), 0.04)
 
@@ -68,7 +68,7 @@ def test_the_axis_is_exact_near_the_poles_too(small, end):
         axis = np.array([small * lean[0], small * lean[1], end])
         if not axis.any():
             continue
-        turn = turned(axis)
+        turn = least_turn(axis)
         assert np.abs(turn.T @ turn - np.eye(3)).max() < 1e-15
         assert np.linalg.det(turn) == pytest.approx(1, abs=1e-15)
         unit = axis / np.linalg.norm(axis)
@@ -81,10 +81,10 @@ def test_the_axis_is_exact_near_the_poles_too(small, end):
 
 
 def test_the_axis_at_the_poles_and_of_any_length():
-    assert turned(np.array([0, 0, 2.0])).tolist() == np.eye(3).tolist()
-    assert turned(np.array([0, 0, -2.0])).tolist() == np.diag([1.0, -1, -1]).tolist()
+    assert least_turn(np.array([0, 0, 2.0])).tolist() == np.eye(3).tolist()
+    assert least_turn(np.array([0, 0, -2.0])).tolist() == np.diag([1.0, -1, -1]).tolist()
     for length in (5e-324, 1e-200, 1e300):
-        assert turned(np.array([0, length, 0]))[:, 2].tolist() == [0, 1, 0]
+        assert least_turn(np.array([0, length, 0]))[:, 2].tolist() == [0, 1, 0]
 
 
 # --- closing -----------------------------------------------------------------------------------

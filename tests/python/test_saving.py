@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from saved_results import RESULTS, SHAPES, arm, batch, workspace
+from saved_results import DESIGNS, RESULTS, SHAPES, arm, batch, workspace
 
 import tdcr
 from tdcr._core import _shape
@@ -63,6 +63,58 @@ def test_loaded_results_work_like_solved_ones(tmp_path):
     answer = RESULTS["inverse"]()
     answer.save(tmp_path / "i.json")
     assert tdcr.Inverse.load(tmp_path / "i.json").shape == answer.shape
+
+
+def test_loaded_designs_work_like_those_found(tmp_path):
+    found = {name: DESIGNS[name]() for name in ("prebend", "routing", "fit", "grasp")}
+    loaded = {}
+    for name, result in found.items():
+        result.save(tmp_path / f"{name}.npz")
+        loaded[name] = type(result).load(tmp_path / f"{name}.npz")
+        assert (loaded[name].ok, repr(loaded[name])) == (result.ok, repr(result))
+    assert loaded["prebend"].shape == found["prebend"].shape
+    assert loaded["prebend"].message == found["prebend"].message
+    again = tdcr.design.routing(
+        loaded["routing"].robot,
+        found["routing"].target_positions,
+        start=loaded["routing"],
+        settings=loaded["routing"].settings,
+    )
+    assert again.rms <= found["routing"].rms
+    assert loaded["fit"].message == found["fit"].message
+    assert loaded["fit"].rms("train") == found["fit"].rms("train")
+    assert not loaded["fit"].parameters["gain"].flags.writeable
+    assert loaded["fit"].displacements([-0.01, 0.0]).tolist() == (
+        found["fit"].displacements([-0.01, 0.0]).tolist()
+    )
+    assert loaded["grasp"].touch == found["grasp"].touch
+    assert loaded["grasp"].force().tolist() == found["grasp"].force().tolist()
+
+
+def test_a_grasp_writes_its_robots_and_obstacles_once(tmp_path):
+    result = DESIGNS["grasp"]()
+    result.save(tmp_path / "g.json")
+    data = json.loads((tmp_path / "g.json").read_text("utf-8"))
+    assert (data["format"], data["kind"]) == (1, "Grasp")
+    assert [robot["name"] for robot in data["robots"]] == ["claw 0", "claw 1", "claw 2"]
+    assert [one["type"] for one in data["obstacles"]] == ["Sphere", "HalfSpace"]
+    assert [shape["robot"] for shape in data["shapes"][2]] == [0, 1, 2]
+    assert [shape["obstacles"] for shape in data["shapes"][2]] == [[0, 1]] * 3
+
+
+def test_designs_have_no_tables_of_rows(tmp_path):
+    for name, what in (
+        ("prebend", "a Prebend, got .*; its shape can be saved as .csv"),
+        ("routing", "a Routing, got .*; its shape can be saved as .csv"),
+        ("fit", "a Fit, got [^;]*$"),
+        ("grasp", "a Grasp, got [^;]*$"),
+    ):
+        result = DESIGNS[name]()
+        with pytest.raises(tdcr.InvalidInput, match=rf"expected .npz or .json for {what}"):
+            result.save(tmp_path / "d.csv")
+        with pytest.raises(tdcr.InvalidInput, match=r"expected no .parquet for \w+, which is no"):
+            result.save(tmp_path / "d.parquet")
+    assert not list(tmp_path.iterdir())
 
 
 def test_files_say_what_they_are_and_others_can_read_them(tmp_path):
@@ -173,6 +225,31 @@ def test_a_changed_file_says_where_it_is_wrong(saved, tmp_path, change, text):
         ("no frames", {"frames": None}, "frames: expected true or false, got None"),
         ("touching batch", {"contacts": {"row": 3}}, "contacts: expected columns"),
         ("workspace", {"seed": -1}, "seed: expected a whole number, got -1"),
+        ("prebend", {"shape": None}, "shape: expected the fields of a Shape"),
+        ("prebend", {"error": [0.0]}, r"error: expected shape \(7\), got \(1,\)"),
+        ("prebend", {"settings": None}, "settings: type: expected one of PrebendSettings"),
+        ("prebend", {"settings": {"type": "RodSettings"}}, "settings: type: expected one of Pre"),
+        ("prebend", {"clearance": "near"}, "clearance: expected a number, got 'near'"),
+        ("prebend", {"status": "bent"}, "status: expected 'converged' or"),
+        ("routing", {"holes": [[0, 1]]}, "holes: expected a list of hole numbers for each of 2"),
+        ("routing", {"holes": [[0, 1], [0.5]]}, r"holes\[1\]: expected whole numbers"),
+        ("routing", {"bounds": [[0.0, 0.0]]}, "bounds: expected a list of lowest and highest"),
+        ("routing", {"bounds": [[0.0], [1.0, 1.0]]}, r"bounds\[0\]: expected shape \(2\)"),
+        ("routing", {"optimality": "proven"}, "optimality: expected 'reached' or"),
+        ("routing", {"rms": DEEP}, "nested too deeply|rms: expected a number"),
+        ("fit", {"parameters": [1.0]}, r"parameters: expected values by name, got \[1.0\]"),
+        ("fit", {"parameters": {"mass": [1.0]}}, r"parameters\.mass: expected one of offset, gain"),
+        ("fit", {"parameters": {"gain": [1.0]}}, r"parameters\.gain: expected shape \(2\)"),
+        ("fit", {"residuals": [[[0.0]]]}, r"residuals: expected shape \(1, 1, 3\)"),
+        ("fit", {"rows": [0]}, r"rows: expected shape \(11\), got \(1,\)"),
+        ("fit", {"validation": [1] * 11}, "validation: expected true or false"),
+        ("fit", {"robot": {}}, "robot: format: missing"),
+        ("grasp", {"shares": [0.0, 1.0]}, "shapes: expected shapes of 2 steps, got 5"),
+        ("grasp", {"shapes": 3}, "shapes: expected a list, got 3"),
+        ("grasp", {"shapes": [[]] * 5}, r"shapes\[0\]: expected the shape of every finger"),
+        ("grasp", {"shapes": [[{}]] * 5}, r"shapes\[0\]\[0\]: expected the fields of a Shape"),
+        ("grasp", {"robots": []}, r"shapes\[0\]\[0\]: robot: expected a place below 0, got 0"),
+        ("grasp", {"obstacles": []}, r"obstacles\[0\]: expected a place below 0, got 0"),
     ],
 )
 def test_changed_files_of_other_kinds_say_so_too(name, change, text, tmp_path):
@@ -246,18 +323,24 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("kind", ["Shape", "ShapeBatch", "Inverse", "InverseBatch", "Workspace"])
+KINDS = (
+    *(tdcr.Shape, tdcr.ShapeBatch, tdcr.Inverse, tdcr.InverseBatch, tdcr.Workspace, tdcr.Grasp),
+    *(tdcr.design.Prebend, tdcr.design.Routing, tdcr.design.Fit),
+)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 @pytest.mark.parametrize("name", WRONG)
 def test_files_that_are_none_are_refused_by_name(name, kind, tmp_path):
     path = tmp_path / name
     path.write_bytes(WRONG[name])
-    if kind == "Workspace" and path.suffix == ".parquet":
+    if kind is tdcr.Workspace and path.suffix == ".parquet":
         pytest.importorskip("pyarrow")
     with pytest.raises(tdcr.InvalidInput) as error:
-        getattr(tdcr, kind).load(path)
+        kind.load(path)
     assert str(path) in str(error.value)
     with pytest.raises(FileNotFoundError, match="gone"):
-        getattr(tdcr, kind).load(tmp_path / "gone.npz")
+        kind.load(tmp_path / "gone.npz")
 
 
 def test_a_robot_file_is_known(tmp_path):
@@ -274,6 +357,24 @@ def test_a_robot_file_is_told_from_results(tmp_path):
     got = "a Shape, which tdcr.Shape.load reads: its .robot is the robot"
     assert str(error.value) == f"{path}: kind: expected a robot file, got {got}"
     assert error.value.argument == "kind"
+    DESIGNS["prebend"]().save(path)
+    with pytest.raises(
+        tdcr.InvalidInput, match=r"got a Prebend, which tdcr\.design\.Prebend\.load"
+    ):
+        tdcr.Robot.load(path)
+    DESIGNS["grasp"]().save(path)
+    with pytest.raises(tdcr.InvalidInput, match=r"its \.shapes\[0\] have those of its fingers"):
+        tdcr.Robot.load(path)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_a_file_of_another_kind_names_what_reads_it(kind, tmp_path):
+    path = tmp_path / "f.npz"
+    result = DESIGNS["fit" if kind is not tdcr.design.Fit else "routing"]()
+    result.save(path)
+    own = f"tdcr.design.{type(result).__name__}.load reads it"
+    with pytest.raises(tdcr.InvalidInput, match=f"expected '{kind.__name__}', got .*{own}"):
+        kind.load(path)
 
 
 @pytest.mark.skipif(resource is None, reason="needs limits of processes")
@@ -340,7 +441,7 @@ def test_an_npz_without_one_of_its_arrays(tmp_path):
         tdcr.Workspace.load(tmp_path / "x.npz")
 
 
-@pytest.mark.parametrize("name", ["touching", "touching batch", "workspace", "track"])
+@pytest.mark.parametrize("name", ["touching", "touching batch", "workspace", "track", *DESIGNS])
 def test_a_damaged_file_is_refused_or_what_it_was(name, tmp_path):
     """Cut off anywhere, and single bytes changed: no other exception, nothing else loaded."""
     result = RESULTS[name]()

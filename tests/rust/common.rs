@@ -1,4 +1,4 @@
-//! What the tests of the linkage share: trunks of one stretch, solved with the default settings.
+//! What the tests share: trunks of one stretch, solved as linkages with the default settings, and the mark of slow tests.
 
 use nalgebra::Vector3;
 use tdcr::linkage::{Linkage, LinkageSettings, Plan};
@@ -29,3 +29,18 @@ pub(crate) fn solve(robot: &Robot, displacements: &[f64]) -> Shape {
 pub(crate) fn tip(shape: &Shape) -> Vector3<f64> {
     shape.state.frames.last().unwrap().translation
 }
+
+/// Marks tests that take more than a second: `make quick` skips what lies in a module `slow`.
+macro_rules! slow {
+    ($($test:ident),+ $(,)?) => {
+        mod slow {
+            $(
+                #[test]
+                fn $test() {
+                    super::$test();
+                }
+            )+
+        }
+    };
+}
+pub(crate) use slow;

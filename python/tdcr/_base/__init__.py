@@ -1,1 +1,1 @@
-"""What every room may use: checks of arguments, values, statuses, progress, rotations."""
+"""Checks of arguments, values, statuses, progress, rotations: every room may use them."""

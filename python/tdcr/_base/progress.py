@@ -1,4 +1,4 @@
-"""Who is told how far a long call has come."""
+"""Progress of long calls: a bar on a terminal, or a callable of the user."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from contextlib import contextmanager
 
 import numpy as np
 
-__all__ = ["told"]
+__all__ = ["progress_callback"]
 
 
 @contextmanager
-def told(
+def progress_callback(
     progress: bool | Callable[[int], object], name: str, total: int | None
 ) -> Iterator[Callable[[int], object] | None]:
-    """Give the callable that is told what is done, or None.
+    """Give the callable that gets the count of what is done, or None.
 
     Parameters
     ----------

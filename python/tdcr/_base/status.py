@@ -1,4 +1,4 @@
-"""How a solve ended."""
+"""Outcomes of solves."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-__all__ = ["Value", "rebuilt", "same"]
+__all__ = ["Value", "rebuild", "same"]
 
 
 class Value:
@@ -35,7 +35,7 @@ class Value:
         self.__dict__.update({name: _read_only(value) for name, value in state.items()})
 
 
-def rebuilt(kind: Any, *values: Any) -> Any:
+def rebuild(kind: Any, *values: Any) -> Any:
     """Return a named tuple from its values, arrays read-only: its way out of a pickle."""
     return kind(*map(_read_only, values))
 
@@ -43,8 +43,8 @@ def rebuilt(kind: Any, *values: Any) -> Any:
 def _read_only(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         value.flags.writeable = False
-    if isinstance(value, list):
-        return [_read_only(item) for item in value]
+    if type(value) in (list, tuple):
+        return type(value)(_read_only(item) for item in value)
     if isinstance(value, dict):
         return {name: _read_only(item) for name, item in value.items()}
     return value

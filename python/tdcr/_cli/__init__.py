@@ -16,7 +16,8 @@ from io import TextIOWrapper
 import click
 
 from tdcr import InvalidInput, __version__
-from tdcr._cli import options as own
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Commands, Interrupted, Unread
 from tdcr._cli.commands.demo import demo
 from tdcr._cli.commands.design import design
@@ -68,18 +69,18 @@ def _run(arguments: Sequence[str] | None) -> int:
     """Run the command and say what went wrong."""
     try:
         with warnings.catch_warnings():
-            warnings.showwarning = lambda message, *_, **__: own.warn(message)
+            warnings.showwarning = lambda message, *_, **__: out.warn(message)
             return int(_group.main(arguments, prog_name="tdcr", standalone_mode=False) or 0)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         return 0
     except click.BadParameter as error:
         missing = isinstance(error, click.MissingParameter)
-        return _refuse(_said(error) + _see_help(error) * missing)
+        return _refuse(_one_line(error) + _see_help(error) * missing)
     except click.UsageError as error:
-        return _refuse(_said(error) + _see_help(error))
+        return _refuse(_one_line(error) + _see_help(error))
     except click.ClickException as error:
-        return _refuse(_said(error))
+        return _refuse(_one_line(error))
     except (click.Abort, Interrupted):
         # On a terminal the line has a ^C already.
         click.echo("\n" * sys.stderr.isatty() + "tdcr: interrupted", err=True)
@@ -104,7 +105,7 @@ def _open_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _said(error: click.ClickException) -> str:
+def _one_line(error: click.ClickException) -> str:
     return " ".join(error.format_message().split())
 
 
@@ -125,7 +126,7 @@ def _refuse(message: str) -> int:
     "tdcr",
     cls=Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog=own.examples(
+    epilog=options.examples(
         "demo --files .",
         "forward trunk.toml -d -15 free free free -5 free --unit mm",
         files=False,

@@ -136,10 +136,10 @@ class Command(click.Command):
 
     def parse_args(self, context: click.Context, arguments: list[str]) -> list[str]:
         options = {n for p in self.params if isinstance(p, Numbers) for n in p.opts}
-        return super().parse_args(context, list(_gathered(arguments, options)))
+        return super().parse_args(context, list(_join_numbers(arguments, options)))
 
 
-def _gathered(arguments: list[str], options: set[str]) -> Iterator[str]:
+def _join_numbers(arguments: list[str], options: set[str]) -> Iterator[str]:
     """Give the words of a command line, with the numbers after an option in one word."""
     rest = list(arguments)
     while rest:

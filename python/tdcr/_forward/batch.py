@@ -9,25 +9,22 @@ import numpy as np
 
 from tdcr import _core
 from tdcr._base.arguments import several_obstacles
-from tdcr._base.progress import told
+from tdcr._base.progress import progress_callback
 from tdcr._base.value import Value, same
+from tdcr._io.save_load import Saved
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     from numpy.typing import ArrayLike, NDArray
 
+    from tdcr._base.models import Settings
     from tdcr._core import (
-        ConstantCurvatureSettings,
-        LinkageSettings,
         Loads,
         Obstacle,
         Robot,
-        RodSettings,
         Shape,
     )
 
-    Settings: TypeAlias = RodSettings | LinkageSettings | ConstantCurvatureSettings
+    Floats: TypeAlias = NDArray[np.float64]
 
 __all__ = ["ShapeBatch", "forward_batch"]
 
@@ -48,7 +45,31 @@ CONTACT = np.dtype(
 )
 
 
-class ShapeBatch(Sequence["Shape"]):
+class _Column:
+    """Column of a batch that is there if it was computed; else reading it says how to get it."""
+
+    def __set_name__(self, owner: type[object], name: str) -> None:
+        self.name = name
+
+    def __get__(self, batch: ShapeBatch | None, owner: type[object]) -> Any:
+        if batch is None:
+            return self
+        # Through __dict__: while a pickle is being read there is no _columns yet.
+        columns = batch.__dict__.get("_columns", {})
+        if self.name in columns:
+            return columns[self.name]
+        raise AttributeError(
+            f"{self.name}: not computed; ask for it with forward_batch(..., "
+            f"fields={(*batch.fields, self.name)!r})"
+        )
+
+
+def _column() -> Any:
+    """Give a column under the type that its annotation says."""
+    return _Column()
+
+
+class ShapeBatch(Saved, Sequence["Shape"]):
     """Shapes of one robot under many displacements, in the order of the rows.
 
     The fields asked for are attributes, and so are `status` (B,), `ok` (B,), `residual` (B,) and
@@ -97,7 +118,7 @@ class ShapeBatch(Sequence["Shape"]):
     def __init__(
         self,
         robot: Robot,
-        displacements: NDArray[np.float64],
+        displacements: Floats,
         model: str,
         settings: Settings | None,
         columns: dict[str, Any],
@@ -117,13 +138,27 @@ class ShapeBatch(Sequence["Shape"]):
         )
 
     robot: Robot
-    displacements: NDArray[np.float64]
+    displacements: Floats
     model: str
     settings: Settings | None
     warm: bool
     obstacles: tuple[Obstacle, ...]
     loads: Loads | None
     _columns: dict[str, Any]
+
+    tip: Floats = _column()
+    frames: Floats = _column()
+    positions: Floats = _column()
+    strains: Floats = _column()
+    tendon_points: list[Floats] = _column()
+    tendon_lengths: Floats = _column()
+    tensions: Floats = _column()
+    energy: Floats = _column()
+    contacts: NDArray[np.void] = _column()
+    status: NDArray[np.object_] = _column()
+    ok: NDArray[np.bool_] = _column()
+    residual: Floats = _column()
+    iterations: NDArray[np.uint64] = _column()
 
     # From a pickle or a copy, with arrays that stay read-only.
     __setstate__ = Value.__setstate__
@@ -136,22 +171,9 @@ class ShapeBatch(Sequence["Shape"]):
         """Refuse: a result does not change."""
         raise AttributeError(f"{name}: a ShapeBatch cannot be changed")
 
-    def __getattr__(self, name: str) -> Any:
-        """Return a computed field; tell how to get one that was not asked for."""
-        # Through __dict__: while a pickle is being read there is no _columns yet.
-        columns = self.__dict__.get("_columns", {})
-        if name in columns:
-            return columns[name]
-        if name in FIELDS:
-            raise AttributeError(
-                f"{name}: not computed; ask for it with forward_batch(..., "
-                f"fields={(*self.fields, name)!r})"
-            )
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-
     def __dir__(self) -> list[str]:
-        """List the computed fields too."""
-        return sorted({*super().__dir__(), *self._columns})
+        """List the computed fields alone."""
+        return sorted({*super().__dir__()} - ({*FIELDS} - {*self._columns}))
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -190,51 +212,6 @@ class ShapeBatch(Sequence["Shape"]):
             return _core._chained_shape(self.robot, self.displacements, row, settings, **around)
         own = self.displacements[row]
         return _core.forward(self.robot, own, model=self.model, settings=settings, **around)
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the batch into a file that appears complete or not at all.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            Ending in .npz or .json, which `load` reads back equal;
-            or in .csv or .parquet, for other programs: displacements and computed fields by row,
-            but for rotations, strains, holes and contacts. Replaced if it exists.
-
-        Raises
-        ------
-        InvalidInput
-            Another file ending; a `SignedDistance` among the obstacles, whose
-            functions no file holds.
-        ImportError
-            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
-        OSError
-            The file cannot be written.
-        """
-        from tdcr._io.save_load import save
-
-        save(self, path)
-
-    @classmethod
-    def load(cls, path: str | PathLike[str]) -> ShapeBatch:
-        """Read a batch that `save` wrote. No code of a file is run.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            File ending in .npz or .json.
-
-        Raises
-        ------
-        InvalidInput
-            Another file: names path and field, what was expected and what was there.
-        OSError
-            The file cannot be read.
-        """
-        from tdcr._io.save_load import load
-
-        loaded: ShapeBatch = load(path, "ShapeBatch")
-        return loaded
 
     def __repr__(self) -> str:
         """Tell size, outcome and fields."""
@@ -304,7 +281,7 @@ def forward_batch(
     # Once: each row's shape is made of them again.
     obstacles = several_obstacles(obstacles)
     total = len(displacements) if isinstance(displacements, Sized) else None
-    with told(progress, "forward_batch", total) as tell:
+    with progress_callback(progress, "forward_batch", total) as tell:
         columns = _core._forward_batch(
             robot,
             displacements,
@@ -317,6 +294,7 @@ def forward_batch(
             progress=tell,
             warm=warm,
         )
+    # Records of contacts; the rows are the result's own.
     if "contacts" in columns:
         columns["contacts"] = _table(columns["contacts"])
     given = columns.pop("displacements")

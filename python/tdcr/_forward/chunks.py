@@ -16,8 +16,8 @@ from tdcr._forward.batch import forward_batch
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from tdcr._base.models import Settings
     from tdcr._core import Loads, Obstacle, Robot
-    from tdcr._forward.batch import Settings
 
 __all__ = ["Solver", "spread"]
 
@@ -29,7 +29,7 @@ _TRIES = 3
 
 @dataclass(frozen=True)
 class Solver:
-    """What every piece is solved with; it pickles if its robot's surroundings do."""
+    """Solver of a piece; it pickles if its robot's surroundings do."""
 
     robot: Robot
     model: str
@@ -155,13 +155,13 @@ def spread(
         return
     workers = _Workers(executor, solver)
     try:
-        _spread(workers, pieces, keep)
+        _solve_pieces(workers, pieces, keep)
     finally:
         for future in workers.running:
             future.cancel()
 
 
-def _spread(
+def _solve_pieces(
     workers: _Workers,
     pieces: Iterable[_Piece],
     keep: Callable[[int, dict[str, NDArray[Any]]], None],

@@ -1,4 +1,4 @@
-"""What the derivatives of a rod are handed over in."""
+"""Derivatives of a rod by name."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from tdcr._base.value import rebuilt
+from tdcr._base.value import rebuild
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -15,20 +15,20 @@ __all__ = ["Gradient", "Variation"]
 
 
 class Variation(NamedTuple):
-    """What a change does to a shape, by `Sensitivity.forward`. Arrays are read-only."""
+    """Change of a shape, by `Sensitivity.forward`. Arrays are read-only."""
 
     strains: NDArray[np.float64]
-    """Of every element's strain, as in `Shape.strains`: rotation vector [rad] and elongation."""
+    """Change of every element's strain, as in `Shape.strains`: rotation [rad] and elongation."""
     tensions: NDArray[np.float64]
-    """Of each tension, (K,), in the unit of `Shape.tensions`; 0 where a tendon does not count."""
+    """Change of each tension, (K,), in the unit of `Shape.tensions`; 0 where one does not count."""
     velocities: NDArray[np.float64]
-    """Of each disk's centre, (n + 1, 3), world axes [m]."""
+    """Change of each disk's centre, (n + 1, 3), world axes [m]."""
     spins: NDArray[np.float64]
     """Rotation of each disk, (n + 1, 3), about world axes [rad]."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle so that arrays stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)
 
 
 class Gradient(NamedTuple):
@@ -47,4 +47,4 @@ class Gradient(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle so that arrays stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)

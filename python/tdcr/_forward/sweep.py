@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 import numpy as np
 
 from tdcr._base.arguments import numbers, several_obstacles, tendons_of, whole
-from tdcr._base.progress import told
+from tdcr._base.progress import progress_callback
 from tdcr._base.status import Status
 from tdcr._forward.batch import ShapeBatch, forward_batch
 from tdcr._io.atomic_write import replace_file
@@ -22,8 +22,8 @@ from tdcr.errors import InvalidInput
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from tdcr._base.models import Settings
     from tdcr._core import Loads, Obstacle, Robot
-    from tdcr._forward.batch import Settings
 
     Rows: TypeAlias = ArrayLike | Iterable[ArrayLike] | Callable[[int, int], ArrayLike]
     Array = NDArray[np.float64]
@@ -33,25 +33,25 @@ __all__ = ["Sweep", "sweep"]
 
 @dataclass(frozen=True)
 class Sweep:
-    """What `sweep` wrote: which file, how many rows, how they ended."""
+    """File that `sweep` wrote, the number of its rows and how they ended."""
 
     path: str
     """The file."""
     rows: int
-    """How many it has."""
+    """Number of its rows."""
     counts: dict[Status, int] = field(hash=False)
-    """How many rows ended how, the most frequent first."""
+    """Number of rows by status, the most frequent first."""
     seconds: float
-    """How long it took, writing included."""
+    """Time that it took, writing included [s]."""
 
     @property
     def converged(self) -> int:
-        """How many rows converged."""
+        """Number of rows that converged."""
         return self.counts.get(Status.converged, 0)
 
     @property
     def ok(self) -> bool:
-        """Whether all did."""
+        """True if all rows converged."""
         return self.converged == self.rows
 
 
@@ -152,7 +152,7 @@ def sweep(
 
     def write(stream: Any) -> None:
         done = 0
-        with told(progress, "sweep", total) as tell, columns.into(stream) as keep:
+        with progress_callback(progress, "sweep", total) as tell, columns.into(stream) as keep:
             for rows in _cut(given, size):
                 with _faults_in(done, len(rows)):
                     batch = solve(rows, _after(done, tell))
@@ -170,7 +170,7 @@ def sweep(
 def _blocks(displacements: Any, tendons: int, size: int) -> tuple[Iterator[Array], int | None]:
     """Blocks of rows in their order, and how many rows they have if that is known."""
     if callable(displacements):
-        return _called(displacements, tendons, size), None
+        return _call_blocks(displacements, tendons, size), None
     if isinstance(displacements, Sequence):
         blocks = len(displacements) and getattr(displacements[0], "ndim", 0) == 2
         displacements = iter(displacements) if blocks else numbers("displacements", displacements)
@@ -188,7 +188,7 @@ def _blocks(displacements: Any, tendons: int, size: int) -> tuple[Iterator[Array
     raise TypeError(f"displacements: expected {expected}, got {got}")
 
 
-def _called(give: Callable[[int, int], Any], tendons: int, size: int) -> Iterator[Array]:
+def _call_blocks(give: Callable[[int, int], Any], tendons: int, size: int) -> Iterator[Array]:
     taken = 0
     name = "displacements: what the function gives"
     while len(block := _block(name, give(taken, size), tendons)):

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 
 from tdcr._base.status import Status
-from tdcr._io.codecs import KINDS
-from tdcr._io.result_file import header_text, taken
-from tdcr._io.tables import columns_of, require_pyarrow
+from tdcr._forward.codecs import batch_columns, write_batch
+from tdcr._io.result_file import header_text, move_arrays
+from tdcr._io.tables import require_pyarrow
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def writer_of(path: StrPath) -> Callable[[StrPath, ShapeBatch], Writer]:
         expected = "a file ending in .npz or .parquet"
         raise InvalidInput(f"path: expected {expected}, got {os.fspath(path)!r}", "path")
     if Path(path).is_dir():
-        # Else it would be told after the last row.
+        # Else the fault would come after the last row.
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
     if suffix == ".npz":
         return _Npz
@@ -69,7 +69,7 @@ class _Parquet:
         self.schema = self.table(0, blank).schema
 
     def table(self, start: int, batch: ShapeBatch) -> Any:
-        columns = columns_of(batch)
+        columns = batch_columns(batch)
         columns["row"] = columns["row"] + start
         return self.arrow.table({name: self.arrow.array(one) for name, one in columns.items()})
 
@@ -83,7 +83,7 @@ class _Parquet:
 
 
 class _Npz:
-    """What `ShapeBatch.save` writes: columns gathered in files of their own, then put together.
+    """The file that `ShapeBatch.save` writes: columns are gathered apart, then put together.
 
     A member of an archive is written from its first byte to its last, and has its shape in front.
     """
@@ -94,9 +94,9 @@ class _Npz:
         self.blank = self.rows(0, blank)
         self.constant: dict[str, Any] = {}
         fields: dict[str, Any] = {}
-        for name, value in KINDS["ShapeBatch"].said(blank).items():
+        for name, value in write_batch(blank).items():
             if name not in self.names:
-                fields[name] = taken(value, name, self.constant)
+                fields[name] = move_arrays(value, name, self.constant)
             elif isinstance(value, list):
                 fields[name] = [{"array": f"{name}.{k}"} for k in range(len(value))]
             else:

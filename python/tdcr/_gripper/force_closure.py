@@ -1,4 +1,4 @@
-"""Whether contacts can hold a body against any force and moment."""
+"""Force closure: contacts that can hold a body against any force and moment."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def wrenches(points: Array, pushes: Array, friction: float, edges: int) -> Array
 
 
 def positively_span(columns: Array) -> bool:
-    """Whether sums of the columns with factors >= 0 reach everywhere.
+    """Tell if sums of the columns with factors >= 0 reach everywhere.
 
     They do if and only if the columns span the space and some sum with all factors positive is
     zero: the origin is then inside their convex hull. Scaled, the factors are 1 + x with x >= 0, so
@@ -77,7 +77,7 @@ def positively_span(columns: Array) -> bool:
 
 
 def _feasible(a: Array, b: Array) -> bool:
-    """Whether ``a @ x = b`` has a solution x >= 0; Bland's rule, which ends."""
+    """Tell if ``a @ x = b`` has a solution x >= 0; Bland's rule, which ends."""
     rows, count = a.shape
     sign = np.where(b < 0, -1.0, 1.0)
     table = np.hstack([a * sign[:, None], np.eye(rows), (b * sign)[:, None]])

@@ -1,4 +1,4 @@
-"""Where the fingers of a gripper stand, and how far each is pulled."""
+"""Bases of the fingers of a gripper, and their pulls."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["places_around", "pulls", "turned"]
+__all__ = ["least_turn", "places_around", "pulls"]
 
 # Nearer than this to -z an axis is -z: the side it leans to would be of rounding alone.
 _ROUNDING = 1e-15
@@ -34,7 +34,7 @@ def places_around(count: Any, distance: Any, axis: Any, center: Any, azimuth: An
     if not math.isfinite(azimuth):
         raise InvalidInput(f"azimuth: expected a finite number [rad], got {azimuth!r}", "azimuth")
     frame = np.eye(4)
-    frame[:3, :3] = turned(vector("axis", axis))
+    frame[:3, :3] = least_turn(vector("axis", axis))
     frame[:3, 3] = vector("center", center, " [m]")
     places = []
     for k in range(count):
@@ -51,7 +51,7 @@ def places_around(count: Any, distance: Any, axis: Any, center: Any, azimuth: An
     return places
 
 
-def turned(axis: Array) -> Array:
+def least_turn(axis: Array) -> Array:
     """Rotation by the least angle that takes z to an axis, shape (3,); about x to -z.
 
     Two turns about z and one about y between them: no small divisor before -z, as in x²/(1 + z).

@@ -1,4 +1,4 @@
-"""What inverses give back: one answer, and many."""
+"""Results of inverses: one answer, and many."""
 
 from __future__ import annotations
 
@@ -12,26 +12,22 @@ import numpy as np
 from tdcr import _core
 from tdcr._base.status import Status
 from tdcr._base.value import Value
+from tdcr._io.save_load import Saved
 from tdcr.errors import NotConverged
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     from numpy.typing import NDArray
 
+    from tdcr._base.models import Settings
     from tdcr._core import (
         Bounds,
-        ConstantCurvatureSettings,
         InverseSettings,
-        LinkageSettings,
         Loads,
         Obstacle,
         Robot,
-        RodSettings,
         Shape,
     )
 
-    Settings: TypeAlias = RodSettings | LinkageSettings | ConstantCurvatureSettings
     Array: TypeAlias = NDArray[np.float64]
     Method: TypeAlias = Literal["newton", "pso"]
 
@@ -39,7 +35,7 @@ __all__ = ["Inverse", "InverseBatch"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Inverse(Value):
+class Inverse(Saved, Value):
     """Displacements that bring the tool to a target, and how it went. Arrays are read-only."""
 
     robot: Robot
@@ -56,8 +52,8 @@ class Inverse(Value):
     no shape was found at all (`error` is NaN);
     iteration_limit, numerical_error: stopped before either."""
     message: str
-    """What stood in the way; empty when it converged, unless from rest the displacements lead to
-    another shape."""
+    """Reason why it did not converge; empty when it converged, unless from rest the displacements
+    lead to another shape."""
     error: float
     """Distance from the tool to the target, over the axes that count; the largest of a disk [m].
     NaN where no shape was found."""
@@ -73,7 +69,7 @@ class Inverse(Value):
     search: InverseSettings
     method: Method
     hits: int = 1
-    """How many starts led to this answer (`inverse_solutions`)."""
+    """Number of starts that led to this answer (`inverse_solutions`)."""
     obstacles: tuple[Obstacle, ...] = ()
     loads: Loads | None = None
     known_shape: Shape | None = None
@@ -83,7 +79,7 @@ class Inverse(Value):
 
     @property
     def ok(self) -> bool:
-        """Whether it converged."""
+        """True if it converged."""
         return self.status is Status.converged
 
     @cached_property
@@ -119,46 +115,6 @@ class Inverse(Value):
             return self
         raise NotConverged(f"{self.status}: {self.message}", self)
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the answer into a file that appears complete or not at all.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            Ending in .npz or .json, which `load` reads back equal. Replaced if it exists.
-
-        Raises
-        ------
-        InvalidInput
-            Another file ending.
-        OSError
-            The file cannot be written.
-        """
-        from tdcr._io.save_load import save
-
-        save(self, path)
-
-    @classmethod
-    def load(cls, path: str | PathLike[str]) -> Inverse:
-        """Read an answer that `save` wrote. No code of a file is run.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            File ending in .npz or .json.
-
-        Raises
-        ------
-        InvalidInput
-            Another file: names path and field, what was expected and what was there.
-        OSError
-            The file cannot be read.
-        """
-        from tdcr._io.save_load import load
-
-        loaded: Inverse = load(path, "Inverse")
-        return loaded
-
     def __repr__(self) -> str:
         """Tell the outcome and the displacements."""
         pulls = np.array2string(
@@ -171,7 +127,7 @@ class Inverse(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class InverseBatch(Value, Sequence[Inverse]):
+class InverseBatch(Saved, Value, Sequence[Inverse]):
     """Inverses of one robot, in the order of their targets; `batch[i]` is an `Inverse`."""
 
     robot: Robot
@@ -184,7 +140,7 @@ class InverseBatch(Value, Sequence[Inverse]):
     status: NDArray[Any]
     """`Status` of every row, (B,)."""
     ok: NDArray[np.bool_]
-    """Whether the row converged, (B,)."""
+    """True for rows that converged, (B,)."""
     error: Array
     """Distances to the targets, (B,) [m]."""
     rotation_error: Array
@@ -252,49 +208,6 @@ class InverseBatch(Value, Sequence[Inverse]):
         around = [" among the obstacles"] * bool(self.obstacles)
         around += [" under the loads"] * (self.loads is not None)
         return " and".join(around)
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the answers into a file that appears complete or not at all.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            Ending in .npz or .json, which `load` reads back equal;
-            or in .csv or .parquet, for other programs: a row per target. Replaced if it exists.
-
-        Raises
-        ------
-        InvalidInput
-            Another file ending.
-        ImportError
-            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
-        OSError
-            The file cannot be written.
-        """
-        from tdcr._io.save_load import save
-
-        save(self, path)
-
-    @classmethod
-    def load(cls, path: str | PathLike[str]) -> InverseBatch:
-        """Read answers that `save` wrote. No code of a file is run.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            File ending in .npz or .json.
-
-        Raises
-        ------
-        InvalidInput
-            Another file: names path and field, what was expected and what was there.
-        OSError
-            The file cannot be read.
-        """
-        from tdcr._io.save_load import load
-
-        loaded: InverseBatch = load(path, "InverseBatch")
-        return loaded
 
     def __repr__(self) -> str:
         """Tell size and outcome."""

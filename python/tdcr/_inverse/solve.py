@@ -9,7 +9,7 @@ import numpy as np
 
 from tdcr import _core
 from tdcr._base.arguments import several_obstacles
-from tdcr._base.progress import told
+from tdcr._base.progress import progress_callback
 from tdcr._core import Bounds, InverseSettings
 from tdcr._inverse.results import Inverse, InverseBatch
 from tdcr.errors import InvalidInput
@@ -17,8 +17,9 @@ from tdcr.errors import InvalidInput
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from tdcr._base.models import Settings
     from tdcr._core import Loads, Obstacle, Robot, Shape
-    from tdcr._inverse.results import Array, Method, Settings
+    from tdcr._inverse.results import Array, Method
 
     BoundsLike: TypeAlias = Bounds | tuple[ArrayLike, ArrayLike]
 
@@ -119,11 +120,10 @@ def inverse(
     if (target is None) == (positions is None):
         got = "neither" if target is None else "both"
         raise InvalidInput(f"target: expected a target or positions, got {got}", "target")
-    solve = _core._inverse if positions is None else _core._inverse_places
-    wanted = target if positions is None else positions
-    row, shape = solve(
+    row, shape = _core._inverse(
         robot,
-        wanted,  # type: ignore[arg-type]  # One of them is given.
+        target,
+        positions,
         model,
         _displacements(start),
         bounds,
@@ -135,7 +135,7 @@ def inverse(
     )
     return Inverse(
         robot,
-        _frozen(wanted),  # type: ignore[arg-type]
+        _read_only(target if positions is None else positions),  # type: ignore[arg-type]
         *row,
         model,
         settings,
@@ -186,7 +186,7 @@ def inverse_solutions(
     search = InverseSettings() if search is None else search
     bounds = _bounds(bounds)
     rows = _core._inverse_solutions(robot, target, model, bounds, settings, search, method)
-    fixed = _frozen(target)
+    fixed = _read_only(target)
     return [
         Inverse(robot, fixed, *row, model, settings, bounds, search, method, hits)
         for row, hits in rows
@@ -316,7 +316,7 @@ def _many(
     except TypeError:
         # Of no length: the core says what is wrong.
         count = None
-    with told(progress, name, count) as tell:
+    with progress_callback(progress, name, count) as tell:
         columns = _core._inverse_batch(
             robot,
             targets,
@@ -329,7 +329,7 @@ def _many(
         )
     return InverseBatch(
         robot,
-        _frozen(targets),
+        _read_only(targets),
         **columns,
         model=model,
         settings=settings,
@@ -361,7 +361,7 @@ def _displacements(start: Any) -> Any:
     return getattr(start, "displacements", start)
 
 
-def _frozen(numbers: ArrayLike) -> Array:
+def _read_only(numbers: ArrayLike) -> Array:
     """Copy numbers, so that nobody changes them under a result."""
     copy = np.array(numbers, dtype=np.float64)
     copy.flags.writeable = False

@@ -9,22 +9,22 @@ from typing import Any
 
 import numpy as np
 
+from tdcr._base.models import MODELS
 from tdcr._base.status import Status
 from tdcr._core import Robot
-from tdcr._io.plain_data import made
+from tdcr._io.plain_data import OBSTACLES, from_plain
 from tdcr.errors import InvalidInput
 
-__all__ = ["Record"]
+__all__ = ["FieldReader"]
 
-_SETTINGS = ("RodSettings", "LinkageSettings", "ConstantCurvatureSettings")
-_OBSTACLES = ("Sphere", "Cylinder", "HalfSpace", "Capsule", "Box", "Mesh")
+_SETTINGS = tuple(settings.__name__ for settings in MODELS.values())
 _WORDS = {None: np.nan, "inf": np.inf, "-inf": -np.inf}
 _KINDS = {"f": "numbers", "i": "whole numbers", "u": "whole numbers", "b": "true or false"}
 
 Size = int | str
 
 
-class Record:
+class FieldReader:
     """Fields by name; a fault says path, field, what was expected and what was there.
 
     Sizes that are names (K tendons, n subsegments, B rows) are what they are at their first use.
@@ -53,9 +53,9 @@ class Record:
         return self.fields[name]
 
     def robot(self, name: str = "robot") -> Robot:
-        from tdcr._io.robot_file import robot_of
+        from tdcr._io.robot_tables import build_robot
 
-        robot = robot_of(f"{self.path}: {name}", self.get(name))
+        robot = build_robot(f"{self.path}: {name}", self.get(name))
         self.sizes |= {"K": len(robot.tendons), "n": robot.backbone.count}
         self.sizes["n+1"] = robot.backbone.count + 1
         return robot
@@ -91,6 +91,9 @@ class Record:
             raise self.fault(name, f"expected true or false, got {value!r}")
         return value
 
+    def model(self, name: str = "model") -> str:
+        return self.text(name, *MODELS)
+
     def settings(self, name: str = "settings") -> Any:
         """Give the settings of a model, or None."""
         return self.optional(name, _SETTINGS)
@@ -100,26 +103,31 @@ class Record:
         if value is None:
             return None
         with self.at(name):
-            return made(value, kinds)
+            return from_plain(value, kinds)
 
-    def things(self, name: str, kinds: tuple[str, ...] = _OBSTACLES) -> tuple[Any, ...]:
+    def object(self, name: str, kinds: tuple[str, ...]) -> Any:
+        """Object of one of some kinds."""
+        with self.at(name):
+            return from_plain(self.get(name), kinds)
+
+    def objects(self, name: str, kinds: tuple[str, ...] = tuple(OBSTACLES)) -> tuple[Any, ...]:
         value = self.get(name)
         if not isinstance(value, list):
             raise self.fault(name, f"expected a list, got {value!r}")
         found = []
         for i, one in enumerate(value):
             with self.at(f"{name}[{i}]"):
-                found.append(made(one, kinds))
+                found.append(from_plain(one, kinds))
         return tuple(found)
 
     def array(self, name: str, *sizes: Size, dtype: Any = np.float64) -> Any:
         """Array of a shape, read-only; sizes of -1 may be any."""
-        return self.converted(name, self.get(name), sizes, dtype)
+        return self.convert(name, self.get(name), sizes, dtype)
 
-    def converted(self, name: str, value: Any, sizes: tuple[Size, ...], dtype: Any) -> Any:
+    def convert(self, name: str, value: Any, sizes: tuple[Size, ...], dtype: Any) -> Any:
         wanted = np.dtype(dtype)
         if not isinstance(value, np.ndarray):
-            value = self._listed(name, value, wanted)
+            value = self._array_of_lists(name, value, wanted)
             if not value.size:
                 # Lists do not tell the sizes inside of none.
                 inner = sizes[value.ndim :]
@@ -144,7 +152,7 @@ class Record:
         answer.flags.writeable = False
         return answer
 
-    def _listed(self, name: str, value: Any, wanted: np.dtype[Any]) -> Any:
+    def _array_of_lists(self, name: str, value: Any, wanted: np.dtype[Any]) -> Any:
         """Make an array of the lists of a JSON file."""
         if not isinstance(value, list):
             raise self.fault(name, f"expected an array, got {value!r}"[:200])

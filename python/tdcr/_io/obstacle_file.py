@@ -1,37 +1,23 @@
-"""Files of obstacles: ``--obstacles FILE``."""
+"""Files of obstacles, and the obstacles of saved results."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-import click
-
-from tdcr._cli.options import FILE
+from tdcr._io.field_reader import FieldReader
+from tdcr._io.lengths import to_metres
+from tdcr._io.plain_data import LENGTHS
+from tdcr._io.result_file import read_any
+from tdcr._io.text_file import parse
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from tdcr import Obstacle
+    from tdcr._core import Obstacle
 
-__all__ = ["obstacles_option", "read_obstacles"]
+__all__ = ["read_obstacles"]
 
-Command = TypeVar("Command", bound=Callable[..., Any])
-
-# Arguments of the constructors that are lengths or places; the others have no unit.
-_LENGTHS = ("a", "b", "center", "half_extents", "point", "radius", "vertices")
 _KEYS = ("format", "length_unit", "obstacles")
-
-
-def obstacles_option(command: Command) -> Command:
-    """Option for what is in the way."""
-    return click.option(
-        "--obstacles",
-        type=FILE,
-        metavar="FILE",
-        help="What is in the way: a file of obstacles (.toml, .json), or a saved result, whose "
-        "obstacles are taken.",
-    )(command)
 
 
 def read_obstacles(path: Path | None) -> tuple[Obstacle, ...]:
@@ -46,27 +32,23 @@ def read_obstacles(path: Path | None) -> tuple[Obstacle, ...]:
     """
     if path is None:
         return ()
-    from tdcr._io.field_reader import Record
-    from tdcr._io.result_file import opened
-    from tdcr._io.robot_file import parsed
-
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        fields = opened(path)
+        fields = read_any(path)
     elif suffix in (".toml", ".json"):
-        fields = parsed(path, path.read_bytes(), suffix)
+        fields = parse(path, path.read_bytes(), suffix)
         if isinstance(fields, dict) and "kind" in fields:
-            fields = opened(path)
+            fields = read_any(path)
         else:
-            fields = {"kind": "file of obstacles", "obstacles": _in_metres(path, fields)}
+            fields = {"kind": "file of obstacles", "obstacles": _check_tables(path, fields)}
     else:
         expected = "a file of obstacles ending in .toml, .json or .npz"
         raise InvalidInput(f"obstacles: expected {expected}, got '{path}'", "obstacles")
-    return Record(path, fields).things("obstacles")
+    return FieldReader(path, fields).objects("obstacles")
 
 
-def _in_metres(path: Path, data: Any) -> list[Any]:
-    """Check the head of a file of obstacles, and give its tables with lengths in m."""
+def _check_tables(path: Path, data: Any) -> list[Any]:
+    """Tables of a file of obstacles with lengths in m; its head is checked."""
     if not isinstance(data, dict) or not isinstance(data.get("obstacles"), list):
         expected = "expected a list of tables 'obstacles', each with its type"
         raise InvalidInput(f"{path}: {expected}", "obstacles")
@@ -79,18 +61,15 @@ def _in_metres(path: Path, data: Any) -> list[Any]:
     unit = data.get("length_unit")
     if unit not in ("m", "mm"):
         raise InvalidInput(f"{path}: length_unit: expected 'm' or 'mm', got {unit!r}", "unit")
-    return [_scaled(one, unit) if isinstance(one, dict) else one for one in data["obstacles"]]
+    return [_in_metres(one, unit) if isinstance(one, dict) else one for one in data["obstacles"]]
 
 
-def _scaled(table: dict[str, Any], unit: str) -> dict[str, Any]:
-    return {k: _metres(value, unit) if k in _LENGTHS else value for k, value in table.items()}
+def _in_metres(table: dict[str, Any], unit: str) -> dict[str, Any]:
+    return {k: _metres(value, unit) if k in LENGTHS else value for k, value in table.items()}
 
 
 def _metres(value: Any, unit: str) -> Any:
-    from tdcr._cli.options import in_metres
-
     if isinstance(value, list):
         return [_metres(one, unit) for one in value]
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return in_metres([value], unit)[0]
-    return value
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return to_metres([value], unit)[0] if number else value

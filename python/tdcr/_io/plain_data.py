@@ -1,4 +1,4 @@
-"""Objects as plain data and back, through their constructors: what files hold of them."""
+"""Plain data of objects in files, and back through their constructors."""
 
 from __future__ import annotations
 
@@ -7,36 +7,39 @@ from typing import Any
 import numpy as np
 
 from tdcr import _core
+from tdcr._base.models import MODELS
 from tdcr._base.status import Status
 from tdcr._core import Contact, Robot, SignedDistance
 from tdcr.errors import InvalidInput
 
-__all__ = ["described", "made"]
+__all__ = ["LENGTHS", "OBSTACLES", "from_plain", "to_plain"]
 
-# What files may name, with the positional arguments of the constructors.
-_ARGUMENTS = {
-    "Bounds": (),
-    "Box": ("center", "half_extents", "rotation"),
-    "Capsule": ("a", "b", "radius"),
-    "ConstantCurvatureSettings": (),
-    "Contact": (
-        "disk", "kind", "tendon", "obstacle", "point", "normal", "gap", "force",
-    ),
+# Obstacles that files may name, with the positional arguments of their constructors.
+OBSTACLES = {
+    "Sphere": ("center", "radius"),
     "Cylinder": ("point", "axis", "radius"),
     "HalfSpace": ("point", "normal"),
-    "InverseSettings": (),
-    "LinkageSettings": (),
-    "Loads": (),
+    "Capsule": ("a", "b", "radius"),
+    "Box": ("center", "half_extents", "rotation"),
     "Mesh": ("vertices", "faces"),
-    "PsoSettings": (),
-    "RodSettings": (),
-    "Sphere": ("center", "radius"),
-}  # fmt: skip
+}
+# Arguments of them that are lengths or places; the others have no unit.
+LENGTHS = ("a", "b", "center", "half_extents", "point", "radius", "vertices")
+_SETTINGS = (
+    *(settings.__name__ for settings in MODELS.values()),
+    *("InverseSettings", "PrebendSettings", "PsoSettings", "RoutingSettings"),
+)
+# All that files may name, likewise.
+_ARGUMENTS: dict[str, tuple[str, ...]] = {
+    **OBSTACLES,
+    **dict.fromkeys((*_SETTINGS, "Bounds", "Loads"), ()),
+    "Contact": ("disk", "kind", "tendon", "obstacle", "point", "normal", "gap", "force"),
+}
 _INFINITE = {"inf": np.inf, "-inf": -np.inf}
 
 
-def described(value: Any, name: str) -> Any:
-    """Say a value of a result in plain data and arrays.
+def to_plain(value: Any, name: str) -> Any:
+    """Plain data and arrays of a value of a result.
 
     Parameters
     ----------
@@ -52,9 +55,9 @@ def described(value: Any, name: str) -> Any:
     """
     match value:
         case Robot():
-            from tdcr._io.robot_file import robot_data
+            from tdcr._io.robot_tables import tables_of
 
-            return robot_data(value)
+            return tables_of(value)
         case Status():
             return str(value)
         case SignedDistance():
@@ -64,9 +67,10 @@ def described(value: Any, name: str) -> Any:
         case np.ndarray() if value.dtype == object:
             return np.array([str(one) for one in value], dtype=np.str_)
         case dict():
-            return {key: described(one, f"{name}.{key}") for key, one in value.items()}
+            return {key: to_plain(one, f"{name}.{key}") for key, one in value.items()}
         case list() | tuple():
-            return [described(one, f"{name}[{i}]") for i, one in enumerate(value)]
+            return [to_plain(one, f"{name}[{i}]") for i, one in enumerate(value)]
+    # Objects, by the arguments of their constructors; anything else is plain.
     kind = type(value).__name__
     if kind not in _ARGUMENTS:
         return value
@@ -75,11 +79,11 @@ def described(value: Any, name: str) -> Any:
     else:
         positional, keywords = value.__getnewargs_ex__()
     given = dict(zip(_ARGUMENTS[kind], positional, strict=True)) | keywords
-    return {"type": kind, **{key: described(one, f"{name}.{key}") for key, one in given.items()}}
+    return {"type": kind, **{key: to_plain(one, f"{name}.{key}") for key, one in given.items()}}
 
 
-def made(data: Any, kinds: tuple[str, ...]) -> Any:
-    """Build what `described` said, one of some kinds.
+def from_plain(data: Any, kinds: tuple[str, ...]) -> Any:
+    """Build what `to_plain` said, one of some kinds.
 
     Raises
     ------
@@ -104,6 +108,6 @@ def _argument(value: Any) -> Any:
             return _INFINITE[value]
         case list():
             return tuple(map(_argument, value))
-        case {"type": "PsoSettings"}:
-            return made(value, ("PsoSettings",))
+        case {"type": "PsoSettings" | "RodSettings" as kind}:
+            return from_plain(value, (kind,))
     return value

@@ -1,4 +1,4 @@
-"""Files of results, npz or JSON: a header that says what the file is, and fields by name.
+"""Files of results, npz or JSON: a header with the kind of the file, and fields by name.
 
 In JSON everything is in one object, with NaN as null and infinities as "inf" and "-inf". In npz
 every array is a member of its own, and the member ``header`` is the JSON text of the rest, in which
@@ -14,26 +14,23 @@ import struct
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from tdcr._core import __version__
 from tdcr._io.atomic_write import replace_file
+from tdcr._io.codecs import FORMAT, find_codec, kinds
+from tdcr._io.text_file import StrPath, parse
 from tdcr.errors import InvalidInput
 
-__all__ = ["FORMAT", "check_header", "header_text", "opened", "read_file", "taken", "write_file"]
-
-FORMAT = 1
-"""Version of the format."""
+__all__ = ["check_header", "header_text", "move_arrays", "read_any", "read_file", "write_file"]
 
 # What numpy and zipfile raise over files that are none or damaged.
 _DAMAGE = (
     ValueError, EOFError, KeyError, OSError, RuntimeError, struct.error, zipfile.BadZipFile,
     zlib.error,
 )  # fmt: skip
-
-StrPath: TypeAlias = str | os.PathLike[str]
 
 
 def write_file(path: StrPath, kind: str, fields: dict[str, Any]) -> None:
@@ -43,30 +40,32 @@ def write_file(path: StrPath, kind: str, fields: dict[str, Any]) -> None:
         replace_file(path, lambda stream: stream.write(text.encode()))
         return
     arrays: dict[str, Any] = {}
-    header = header_text(kind, {name: taken(v, name, arrays) for name, v in fields.items()})
+    header = header_text(kind, {name: move_arrays(v, name, arrays) for name, v in fields.items()})
     replace_file(path, lambda stream: np.savez(stream, header=np.array(header), **arrays))
 
 
 def header_text(kind: str, fields: dict[str, Any]) -> str:
-    """Write fields as JSON, with what every file starts with."""
-    data = {"format": FORMAT, "kind": kind, "tdcr": __version__, **fields}
+    """JSON text of fields, after those that every file starts with."""
+    codec = find_codec(kind)
+    version = codec.version if codec else FORMAT
+    data = {"format": version, "kind": kind, "tdcr": __version__, **fields}
     return json.dumps(_standard(data), ensure_ascii=False, allow_nan=False)
 
 
-def taken(value: Any, name: str, arrays: dict[str, Any]) -> Any:
+def move_arrays(value: Any, name: str, arrays: dict[str, Any]) -> Any:
     """Move the arrays of a value out of it; the few numbers of an obstacle, say, stay."""
     if isinstance(value, np.ndarray) and ("." not in name or value.size > 16):
         arrays[name] = value
         return {"array": name}
     if isinstance(value, dict):
-        return {key: taken(one, f"{name}.{key}", arrays) for key, one in value.items()}
+        return {key: move_arrays(one, f"{name}.{key}", arrays) for key, one in value.items()}
     if isinstance(value, list):
-        return [taken(one, f"{name}.{i}", arrays) for i, one in enumerate(value)]
+        return [move_arrays(one, f"{name}.{i}", arrays) for i, one in enumerate(value)]
     return value
 
 
 def _standard(value: Any) -> Any:
-    """Replace what JSON has not: arrays, NaN and infinities."""
+    """Value without arrays, NaN and infinities, which JSON has not."""
     match value:
         case np.ndarray() if value.dtype.names:
             return {name: _standard(value[name]) for name in value.dtype.names}
@@ -97,41 +96,39 @@ def read_file(path: StrPath, kind: str) -> dict[str, Any]:
     OSError
         The file cannot be read.
     """
-    return check_header(path, opened(path), kind)
+    return check_header(path, read_any(path), kind)
 
 
 def check_header(path: StrPath, data: Any, kind: str) -> dict[str, Any]:
     """Check that fields are those of a kind."""
-    fields = _checked(path, data)
+    fields = _check(path, data)
     if fields["kind"] != kind:
         found = fields["kind"]
+        codec = find_codec(found)
+        home = codec.home if codec else "tdcr"
         raise InvalidInput(
             f"{os.fspath(path)}: kind: expected {kind!r}, got {found!r}: "
-            f"tdcr.{found}.load reads it",
+            f"{home}.{found}.load reads it",
             "kind",
         )
     return fields
 
 
-def opened(path: StrPath) -> dict[str, Any]:
+def read_any(path: StrPath) -> dict[str, Any]:
     """Read the fields of a file of any kind; see `read_file`."""
     suffix = Path(path).suffix.lower()
     if suffix == ".npz":
-        return _checked(path, _read_npz(path))
+        return _check(path, _read_npz(path))
     if suffix == ".json":
-        from tdcr._io.robot_file import parsed
-
-        return _checked(path, parsed(path, Path(path).read_bytes(), suffix))
+        return _check(path, parse(path, Path(path).read_bytes(), suffix))
     raise InvalidInput(
         f"path: expected a file ending in .npz or .json, got {os.fspath(path)!r}", "path"
     )
 
 
-def _checked(path: StrPath, data: Any) -> dict[str, Any]:
-    from tdcr._io.codecs import KINDS
-
+def _check(path: StrPath, data: Any) -> dict[str, Any]:
     shown = os.fspath(path)
-    expected = f"{shown}: expected a file that tdcr saved, one of {', '.join(KINDS)}"
+    expected = f"{shown}: expected a file that tdcr saved, one of {', '.join(kinds())}"
     if not isinstance(data, dict):
         raise InvalidInput(f"{expected}; got no table of fields", "path")
     if "kind" not in data and {"backbone", "tendons"} <= data.keys():
@@ -139,11 +136,13 @@ def _checked(path: StrPath, data: Any) -> dict[str, Any]:
     if "kind" not in data or "format" not in data:
         raise InvalidInput(f"{expected}; got a file without 'format' and 'kind'", "path")
     version, kind = data["format"], data["kind"]
-    if type(version) is not int or version != FORMAT:
-        newer = type(version) is int and version > FORMAT
+    codec = find_codec(kind)
+    known = codec.version if codec else FORMAT
+    if type(version) is not int or version != known:
+        newer = type(version) is int and version > known
         hint = f" (tdcr {data.get('tdcr', 'of a later version')} wrote it)" if newer else ""
-        raise InvalidInput(f"{shown}: format: expected {FORMAT}, got {version!r}{hint}", "format")
-    if not isinstance(kind, str) or kind not in KINDS:
+        raise InvalidInput(f"{shown}: format: expected {known}, got {version!r}{hint}", "format")
+    if codec is None:
         raise InvalidInput(f"{expected}; got the kind {kind!r}"[:500], "kind")
     return data
 
@@ -175,7 +174,7 @@ def _read_npz(path: StrPath) -> Any:
         message = f"{shown}: header: expected the text that tdcr writes, got members {names}"
         raise InvalidInput(message, "header")
     try:
-        return _given_back(json.loads(str(header)), arrays)
+        return _put_back(json.loads(str(header)), arrays)
     except KeyError as error:
         raise InvalidInput(f"{shown}: {error.args[0]}: the array is missing", "path") from None
     except (json.JSONDecodeError, RecursionError) as error:
@@ -184,7 +183,7 @@ def _read_npz(path: StrPath) -> Any:
         raise InvalidInput(f"{shown}: header: {error}", "header") from None
 
 
-def _given_back(value: Any, arrays: dict[str, Any]) -> Any:
+def _put_back(value: Any, arrays: dict[str, Any]) -> Any:
     """Put arrays where they were."""
     if isinstance(value, dict):
         if value.keys() == {"array"}:
@@ -192,7 +191,7 @@ def _given_back(value: Any, arrays: dict[str, Any]) -> Any:
             if not isinstance(name, str):
                 raise ValueError(f"expected the name of an array, got {name!r}"[:200])
             return arrays[name]
-        return {key: _given_back(one, arrays) for key, one in value.items()}
+        return {key: _put_back(one, arrays) for key, one in value.items()}
     if isinstance(value, list):
-        return [_given_back(one, arrays) for one in value]
+        return [_put_back(one, arrays) for one in value]
     return value

@@ -11,7 +11,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from tdcr._io.robot_schema import TENDON_TABLES, BackboneTable, RobotTable, metres
+from tdcr._io.lengths import metres
+from tdcr._io.robot_schema import TENDON_TABLES, BackboneTable, RobotTable
 from tdcr.errors import InvalidInput
 
 __all__ = ["meaning", "structure"]
@@ -72,7 +73,7 @@ def _text(
         return f"expected {expected}, got {len(value)}"
     else:
         expected = _EXPECTED.get(kind, message) + _unit(data, parts, kind)
-    return f"expected {expected}, got {_shown(value)}"
+    return f"expected {expected}, got {_show(value)}"
 
 
 def _section(data: Any, parts: list[Any]) -> type[BaseModel]:
@@ -107,7 +108,7 @@ def _at(data: Any, parts: list[Any]) -> Any:
     return data
 
 
-def _shown(value: Any) -> str:
+def _show(value: Any) -> str:
     match value:
         case bool():
             return "true" if value else "false"

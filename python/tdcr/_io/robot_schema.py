@@ -6,7 +6,6 @@ Tags start with "~" so that they can be told from keys in the location of a faul
 
 from __future__ import annotations
 
-from decimal import Decimal
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, WithJsonSchema
@@ -19,7 +18,6 @@ __all__ = [
     "HolesTable",
     "Matrix",
     "RobotTable",
-    "metres",
     "robot_schema",
 ]
 
@@ -185,14 +183,6 @@ class RobotTable(_Table):
     schema_reference: str | None = Field(
         None, alias="$schema", description="JSON schema of this file, for editors; not read."
     )
-
-
-def metres(millimetres: float) -> float:
-    """Convert a length from mm to m: the float nearest to the decimal number in the file.
-
-    25.333 mm is exactly the float 0.025333; ``25.333 / 1000`` is its neighbour.
-    """
-    return float(Decimal(repr(float(millimetres))).scaleb(-3))
 
 
 def robot_schema() -> dict[str, Any]:

@@ -122,13 +122,14 @@ def animate_pull(
             writer.grab_frame()
             if progress is not None:
                 progress(step + 1)
+        # The end is shown for longer.
         for _ in range(_HELD):
             writer.grab_frame()
 
 
 def _frame(figure: Any, shapes: list[Shape], step: int) -> None:
     shape, scenes = shapes[step], [Scene.of(one, "auto") for one in shapes]
-    # The plane of the bend is told best by the shape that is bent most: the last.
+    # The shape that is bent most, the last one, has the plane of the bend.
     plane = plane_of(shapes[-1])
     length = shape.robot.backbone.total_length
     flat = plane.holds and all(

@@ -1,4 +1,4 @@
-"""What a picture of a shape is made of, and the axes it is drawn on.
+"""Parts of the picture of a shape, and the axes it is drawn on.
 
 Everything is in the unit of the picture here. matplotlib is imported inside the functions.
 """

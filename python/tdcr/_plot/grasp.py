@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -11,27 +12,31 @@ from tdcr._base.arguments import whole
 from tdcr._plot.animation import gif_writer
 from tdcr._plot.axes import Scene, Solid, draw, draw_forces
 from tdcr._plot.projection import plane_of
+from tdcr._plot.shape import require_matplotlib
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from tdcr._gripper.gripper import Grasp
+    from numpy.typing import NDArray
+
+    from tdcr._core import Shape
+
+    Steps: TypeAlias = Sequence[Sequence[Shape]]
 
 __all__ = ["animate_grasp", "plot_grasp"]
 
 
 def _figure() -> Any:
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError(
-            "pictures need matplotlib, which is not installed: pip install tdcr[plot]"
-        ) from error
+    require_matplotlib()
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(6.4, 6.0), layout="constrained")
 
 
-def plot_grasp(grasp: Grasp, step: int, ax: Any, title: str | None) -> Any:
-    """Draw a step of a grasp into 3-D axes; see `Grasp.plot`."""
-    row = grasp._row(step)
+def plot_grasp(
+    shapes: Steps, step: int, shares: NDArray[np.float64], ax: Any, title: str | None
+) -> Any:
+    """Draw the fingers at a step into 3-D axes; see `Grasp.plot`."""
+    row = shapes[step]
     if ax is None:
         _figure()
         from matplotlib import pyplot
@@ -42,26 +47,26 @@ def plot_grasp(grasp: Grasp, step: int, ax: Any, title: str | None) -> Any:
     for obstacle in row[0].obstacles:
         canvas.obstacle(obstacle)
     obstacles = list(canvas.seen)
-    every = [c.force for shapes in grasp.shapes for s in shapes if s.ok for c in s.contacts]
+    every = [c.force for one in shapes for s in one if s.ok for c in s.contacts]
     largest = max((float(np.linalg.norm(force)) for force in every), default=0.0)
     for scene in scenes:
         canvas.scene = scene
         draw(canvas, scene, disks=True, tendons=True)
         draw_forces(canvas, scene, largest)
     # The same limits at every step.
-    canvas.seen = obstacles + [
-        s.positions * scenes[0].scale for shapes in grasp.shapes for s in shapes if s.ok
-    ]
+    canvas.seen = obstacles + [s.positions * scenes[0].scale for one in shapes for s in one if s.ok]
     canvas.finish()
     if title is None:
         count = sum(len(shape.contacts) for shape in row)
         failed = "" if all(shape.ok for shape in row) else ", NOT A SOLUTION"
-        title = f"{grasp.shares[step]:.0%} of the pull, {count} contacts{failed}"
+        title = f"{shares[step]:.0%} of the pull, {count} contacts{failed}"
     ax.set_title(title, fontsize=10)
     return ax
 
 
-def animate_grasp(grasp: Grasp, path: str | os.PathLike[str], fps: int) -> None:
+def animate_grasp(
+    shapes: Steps, shares: NDArray[np.float64], path: str | os.PathLike[str], fps: int
+) -> None:
     """Write a GIF; see `Grasp.animate`."""
     if os.path.splitext(path)[1].lower() != ".gif":
         raise InvalidInput(f"path: expected one ending in .gif, got {os.fspath(path)!r}", "path")
@@ -73,7 +78,7 @@ def animate_grasp(grasp: Grasp, path: str | os.PathLike[str], fps: int) -> None:
 
     FigureCanvasAgg(figure)
     with gif_writer(figure, path, fps, dpi=80) as writer:
-        for step in range(len(grasp.shares)):
+        for step in range(len(shares)):
             figure.clear()
-            plot_grasp(grasp, step, figure.add_subplot(projection="3d"), None)
+            plot_grasp(shapes, step, shares, figure.add_subplot(projection="3d"), None)
             writer.grab_frame()

@@ -1,4 +1,4 @@
-"""Where to look at a shape from, and its backbone as a smooth line."""
+"""Plane of a shape, and its backbone as a smooth line."""
 
 from __future__ import annotations
 

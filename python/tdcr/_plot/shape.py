@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import textwrap
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -35,10 +36,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FAILED",
+    "axes_of",
     "check_picture",
     "one_of",
     "plot_shape",
     "require_matplotlib",
+    "save_drawing",
     "save_figure",
     "save_picture",
 ]
@@ -46,6 +49,7 @@ __all__ = [
 View = Literal["auto", "2d", "3d"]
 
 FAILED = "#B3261E"
+_SIZE = (6.4, 5.6)
 
 
 def plot_shape(
@@ -104,6 +108,7 @@ def plot_shape(
     ImportError
         matplotlib is not installed.
     """
+    # Options, and the plane of the picture.
     require_matplotlib()
     one_of("view", view, ("auto", "2d", "3d"))
     one_of("unit", unit, ("auto", "m", "mm"))
@@ -114,7 +119,8 @@ def plot_shape(
     if ax is None:
         from matplotlib import pyplot
 
-        ax = _axes(pyplot.figure(figsize=_SIZE, layout="constrained"), flat)
+        ax = axes_of(pyplot.figure(figsize=_SIZE, layout="constrained"), flat)
+    # From what lies behind to what lies in front.
     canvas = Flat(ax, plane, scene) if flat else Solid(ax, plane, scene)
     for obstacle in shape.obstacles if obstacles else ():
         canvas.obstacle(obstacle)
@@ -126,9 +132,6 @@ def plot_shape(
     canvas.finish()
     _label(ax, scene, title, legend and tendons)
     return ax
-
-
-_SIZE = (6.4, 5.6)
 
 
 def save_picture(shape: Shape, path: str | os.PathLike[str], **options: Any) -> None:
@@ -158,7 +161,23 @@ def save_picture(shape: Shape, path: str | os.PathLike[str], **options: Any) -> 
     marks = options.get("marks")
     places = None if marks is None else places_of(marks)
     flat = _is_flat(shape, options.get("view", "auto"), plane_of(shape), None, places)
-    plot_shape(shape, ax=_axes(figure, flat), **options)
+    plot_shape(shape, ax=axes_of(figure, flat), **options)
+    save_figure(figure, path)
+
+
+def save_drawing(
+    draw: Callable[[Axes], object],
+    path: str | os.PathLike[str],
+    *,
+    flat: bool,
+    size: tuple[float, float] = _SIZE,
+) -> None:
+    """Write what is drawn into axes, without pyplot; see `save_picture`."""
+    check_picture(path)
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    draw(axes_of(figure, flat))
     save_figure(figure, path)
 
 
@@ -222,14 +241,15 @@ def _is_flat(
 
 
 def _lie_in(shape: Shape, plane: Plane, places: Points | None) -> bool:
-    """Whether marked places are in the plane too."""
+    """Tell if marked places are in the plane too."""
     if places is None:
         return True
     off = (places - shape.robot.base[:3, 3]) @ plane.normal
     return bool(np.abs(off).max(initial=0.0) <= 1e-6 * shape.robot.backbone.total_length)
 
 
-def _axes(figure: Figure, flat: bool) -> Axes:
+def axes_of(figure: Figure, flat: bool) -> Axes:
+    """Add plain or 3-D axes to a figure."""
     return figure.add_subplot() if flat else figure.add_subplot(projection="3d")
 
 

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import os
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
-from tdcr._plot.shape import check_picture, one_of, require_matplotlib, save_figure
+from tdcr._plot.shape import axes_of, one_of, require_matplotlib
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
+    from tdcr._core import Robot
     from tdcr._plot.axes import Unit
-    from tdcr._workspace.results import Workspace
-    from tdcr._workspace.voxels import VoxelMap
 
-__all__ = ["plot_workspace", "save_workspace"]
+__all__ = ["SIZE", "plot_workspace"]
 
 View = Literal["section", "3d"]
 Shown = Literal["dexterity", "manipulability", "samples"]
@@ -29,20 +26,39 @@ _LABELS = {
     "manipulability": "manipulability",
     "samples": "samples per voxel",
 }
-_SIZE = (6.4, 4.8)
+SIZE = (6.4, 4.8)
+"""Size of a figure [in]."""
+
+
+class Voxels(Protocol):
+    """Voxels that tips reach, in the frame of the base: edge, centres, values and counts."""
+
+    @property
+    def voxel(self) -> float: ...
+    @property
+    def centers(self) -> Any: ...
+    @property
+    def values(self) -> Any: ...
+    @property
+    def counts(self) -> Any: ...
 
 
 def plot_workspace(
-    workspace: Workspace,
+    robot: Robot,
+    measure: Callable[[Shown], Voxels],
     *,
+    name: str,
     ax: Any = None,
     value: Shown = "dexterity",
     view: View | None = None,
-    voxel: float | None = None,
     title: str | None = None,
     unit: Unit = "auto",
 ) -> Axes:
-    """Draw the voxels that tips reach, coloured; see `Workspace.plot`."""
+    """Draw the voxels that tips reach, coloured by a value; see `Workspace.plot`.
+
+    `measure` gives them once the options are checked; `name` is the title by default.
+    """
+    # Options.
     require_matplotlib()
     one_of("value", value, tuple(_LABELS))
     one_of("unit", unit, ("auto", "m", "mm"))
@@ -51,18 +67,20 @@ def plot_workspace(
     solid = view == "3d" if ax is None else ax.name == "3d"
     if ax is not None and view is not None and solid != (view == "3d"):
         raise InvalidInput(f"view: expected what suits the Axes, {ax.name}, got {view!r}", "view")
-    seen = _map(workspace, value, voxel)
+    # Voxels and backbone, in the unit of the axes.
+    seen = measure(value)
     if ax is None:
         from matplotlib import pyplot
 
-        ax = _axes(pyplot.figure(figsize=_SIZE, layout="constrained"), solid)
+        ax = axes_of(pyplot.figure(figsize=SIZE, layout="constrained"), not solid)
     if unit == "auto":
-        unit = "mm" if workspace.robot.backbone.total_length < 2.0 else "m"
+        unit = "mm" if robot.backbone.total_length < 2.0 else "m"
     scale = 1000.0 if unit == "mm" else 1.0
-    painted = _solid(ax, workspace, seen, scale) if solid else _section(ax, seen, scale)
-    _spine(ax, workspace, scale, solid)
+    painted = _solid(ax, robot, seen, scale) if solid else _section(ax, seen, scale)
+    _spine(ax, robot, scale, solid)
     if solid:
-        _finish(ax, workspace, seen, scale)
+        _finish(ax, robot, seen, scale)
+    # Labels, colour bar and title.
     ax.set_xlabel(f"x [{unit}]")
     if not solid:
         ax.set_ylabel(f"z [{unit}]")
@@ -74,43 +92,14 @@ def plot_workspace(
     )
     bar.set_label(_LABELS[value])
     bar.outline.set_linewidth(0.6)
-    text = _title(workspace) if title is None else title
+    text = name if title is None else title
     if text:
         ax.set_title(text, fontsize=10, parse_math=False)
     drawn: Axes = ax
     return drawn
 
 
-def save_workspace(workspace: Workspace, path: str | os.PathLike[str], **options: Any) -> None:
-    """Draw a workspace into a file, without pyplot; see `save_picture`."""
-    check_picture(path)
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=_SIZE, layout="constrained")
-    plot_workspace(workspace, ax=_axes(figure, options.get("view") == "3d"), **options)
-    save_figure(figure, path)
-
-
-def _axes(figure: Figure, solid: bool) -> Axes:
-    return figure.add_subplot(projection="3d") if solid else figure.add_subplot()
-
-
-def _map(workspace: Workspace, value: Shown, voxel: float | None) -> VoxelMap:
-    """Values per voxel in the frame of the base, where sections are cut."""
-    base = workspace.robot.base
-    turn, place = base[:3, :3], base[:3, 3]
-    local = replace(
-        workspace,
-        tips=(workspace.tips - place) @ turn,
-        directions=workspace.directions @ turn,
-    )
-    if value == "manipulability":
-        return local.manipulability(voxel)
-    seen = local.dexterity(voxel)
-    return seen if value == "dexterity" else seen._replace(values=seen.counts.astype(np.float64))
-
-
-def _section(ax: Any, seen: VoxelMap, scale: float) -> Any:
+def _section(ax: Any, seen: Voxels, scale: float) -> Any:
     """Squares of the layer of voxels beside the plane y = 0."""
     from matplotlib.collections import PolyCollection
 
@@ -141,17 +130,17 @@ def _section(ax: Any, seen: VoxelMap, scale: float) -> Any:
     return painted
 
 
-def _few(seen: VoxelMap, some: Any, others: Any) -> bool:
-    """Whether some voxels hold next to none of the tips that they and others hold."""
+def _few(seen: Voxels, some: Any, others: Any) -> bool:
+    """Tell if some voxels hold next to none of the tips that they and others hold."""
     return bool(10 * seen.counts[some].sum() < seen.counts[others].sum())
 
 
-def _solid(ax: Any, workspace: Workspace, seen: VoxelMap, scale: float) -> Any:
+def _solid(ax: Any, robot: Robot, seen: Voxels, scale: float) -> Any:
     """Centres of the voxels behind the plane y = 0, so that one looks inside."""
     behind = seen.centers[:, 1] > 0.0
     behind = np.ones(len(behind), bool) if _few(seen, behind, ~behind) else behind
     points = seen.centers[behind] * scale
-    whole = np.concatenate([seen.centers, _backbone(workspace)]) * scale
+    whole = np.concatenate([seen.centers, _backbone(robot)]) * scale
     # Squares about as wide as a voxel: 4 inches hold the longest span.
     size = (4.0 * 72.0 * seen.voxel * scale / np.ptp(whole, axis=0).max()) ** 2
     painted = ax.scatter(
@@ -162,11 +151,11 @@ def _solid(ax: Any, workspace: Workspace, seen: VoxelMap, scale: float) -> Any:
     return painted
 
 
-def _finish(ax: Any, workspace: Workspace, seen: VoxelMap, scale: float) -> None:
+def _finish(ax: Any, robot: Robot, seen: Voxels, scale: float) -> None:
     """Equal scale in a box around voxels and backbone, which is never a sliver."""
     from matplotlib.ticker import MaxNLocator
 
-    shown = np.concatenate([seen.centers, _backbone(workspace)]) * scale
+    shown = np.concatenate([seen.centers, _backbone(robot)]) * scale
     low, high = shown.min(axis=0), shown.max(axis=0)
     span = np.maximum(1.05 * (high - low), 0.25 * (high - low).max())
     for axis, name in enumerate("xyz"):
@@ -178,22 +167,15 @@ def _finish(ax: Any, workspace: Workspace, seen: VoxelMap, scale: float) -> None
     ax.set_box_aspect(span)
 
 
-def _backbone(workspace: Workspace) -> Any:
+def _backbone(robot: Robot) -> Any:
     """Places of the disks at rest in the frame of the base."""
-    frames = np.linalg.inv(workspace.robot.base) @ workspace.robot.rest_frames
+    frames = np.linalg.inv(robot.base) @ robot.rest_frames
     return frames[:, :3, 3]
 
 
-def _spine(ax: Any, workspace: Workspace, scale: float, solid: bool) -> None:
+def _spine(ax: Any, robot: Robot, scale: float, solid: bool) -> None:
     """Draw the backbone at rest, from its base."""
-    points = _backbone(workspace).T * scale
+    points = _backbone(robot).T * scale
     shown = points if solid else points[[0, 2]]
     ax.plot(*shown, color="#5F6670", linewidth=2.0, zorder=3.0)
     ax.plot(*shown[:, :1], color="#22262B", marker="s", markersize=6, zorder=3.1)
-
-
-def _title(workspace: Workspace) -> str:
-    name = f"{workspace.robot.name}\n" if workspace.robot.name else ""
-    failed = len(workspace) - int(workspace.ok.sum())
-    lost = f", {failed:,} not converged" if failed else ""
-    return f"{name}{workspace.model} model, {len(workspace):,} samples{lost}"

@@ -1,4 +1,4 @@
-"""How well a robot moves its tool: measures of a Jacobian."""
+"""Manipulability: measures of a Jacobian."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tdcr._base.value import rebuilt
+from tdcr._base.value import rebuild
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Manipulability(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy with arrays that stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)
 
 
 def manipulability(
@@ -70,7 +70,7 @@ def manipulability(
     T. Yoshikawa, "Manipulability of robotic mechanisms", Int. J. Robotics Research 4(2), 1985,
     doi:10.1177/027836498500400201.
     """
-    matrix = _checked(jacobian)
+    matrix = _check_jacobians(jacobian)
     if not isinstance(part, str):
         raise TypeError(f"part: expected a string, got {type(part).__name__}")
     if part not in _PARTS:
@@ -80,6 +80,7 @@ def manipulability(
     if part == "pose" and length is None:
         expected = "what one radian counts, a positive number [m], for a pose"
         raise InvalidInput(f"radian: expected {expected}, got None", "radian")
+    # Rows of the part at the scale of 1, angles as lengths, singular values.
     matrix, size = _unit(matrix[..., _PARTS[part], :])
     if part == "pose":
         weights = np.array([1.0, 1.0, 1.0, length, length, length])
@@ -104,7 +105,7 @@ def manipulability(
     return Manipulability(value, condition, axes)
 
 
-def _checked(jacobian: ArrayLike) -> NDArray[np.float64]:
+def _check_jacobians(jacobian: ArrayLike) -> NDArray[np.float64]:
     """Jacobians as an array, or say what is wrong with them."""
     try:
         given = np.asarray(jacobian)

@@ -1,9 +1,9 @@
-"""What a sampled workspace tells: reach, volume, dexterity, manipulability."""
+"""Sampled workspaces: reach, volume, dexterity, manipulability."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, TypeAlias
 
@@ -12,19 +12,18 @@ import numpy as np
 from tdcr import _core
 from tdcr._base.arguments import whole
 from tdcr._base.status import Status
-from tdcr._base.value import Value, rebuilt
+from tdcr._base.value import Value, rebuild
+from tdcr._io.save_load import Saved
 from tdcr._workspace.manipulability import manipulability
 from tdcr._workspace.voxels import Grid, Volume, VoxelMap, default_voxel, solid_angles, volume
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from tdcr._base.models import Settings
     from tdcr._core import Loads, Obstacle, Robot, Shape
-    from tdcr._forward.batch import Settings
 
     Floats: TypeAlias = NDArray[np.float64]
 
@@ -35,7 +34,7 @@ _STATUSES = tuple(Status)
 
 
 class Reach(NamedTuple):
-    """How far the tips get: distances from the base and the box around them."""
+    """Reach of the tips: distances from the base and the box around them."""
 
     nearest: float
     """Least distance from the centre of the base disk [m]."""
@@ -48,11 +47,11 @@ class Reach(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy with arrays that stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Workspace(Value):
+class Workspace(Saved, Value):
     """Sampled tips of a robot, one row per sample, in the world frame. Arrays are read-only.
 
     Rows that did not converge are kept, with their last iterate: `ok`, `status` and `counts` tell.
@@ -63,7 +62,7 @@ class Workspace(Value):
     ranges: Floats
     """Least and greatest displacement of each tendon, (K, 2) [m]."""
     displacements: Floats
-    """Of each row, (m, K) [m]."""
+    """Displacements of each row, (m, K) [m]."""
     tips: Floats
     """Centre of the tip disk, (m, 3) [m]."""
     directions: Floats
@@ -83,18 +82,18 @@ class Workspace(Value):
 
     @property
     def status(self) -> NDArray[np.object_]:
-        """How each row ended, (m,) of Status."""
+        """Status of each row, (m,)."""
         return np.array(_STATUSES, object)[self.codes]
 
     @property
     def ok(self) -> NDArray[np.bool_]:
-        """Whether each row converged, (m,)."""
+        """True for rows that converged, (m,)."""
         converged: NDArray[np.bool_] = self.codes == _STATUSES.index(Status.converged)
         return converged
 
     @property
     def counts(self) -> dict[Status, int]:
-        """How many rows ended how, the most frequent first."""
+        """Number of rows by status, the most frequent first."""
         found = Counter(self.codes.tolist())
         return {_STATUSES[code]: count for code, count in found.most_common()}
 
@@ -251,7 +250,7 @@ class Workspace(Value):
         ----------
         ax : matplotlib.axes.Axes, optional
             Axes to draw into, plain or 3-D. Default: those of a new figure.
-        value : {"dexterity", "manipulability", "samples"} or VoxelMap, optional
+        value : {"dexterity", "manipulability", "samples"}, optional
             What the colour tells. Default: "dexterity".
         view : {"section", "3d"}, optional
             "section" is the layer of voxels in the plane of the base's x and z axes, the default;
@@ -277,53 +276,28 @@ class Workspace(Value):
         """
         from tdcr._plot.workspace import plot_workspace
 
-        return plot_workspace(self, **options)
+        voxel = options.pop("voxel", None)
+        return plot_workspace(
+            self.robot, lambda value: self._voxel_map(value, voxel), name=self._title(), **options
+        )
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the workspace into a file that appears complete or not at all.
+    def _voxel_map(self, value: str, voxel: float | None) -> VoxelMap:
+        """Values per voxel in the frame of the base, where pictures cut sections."""
+        base = self.robot.base
+        turn, place = base[:3, :3], base[:3, 3]
+        local = replace(self, tips=(self.tips - place) @ turn, directions=self.directions @ turn)
+        if value == "manipulability":
+            return local.manipulability(voxel)
+        seen = local.dexterity(voxel)
+        if value == "dexterity":
+            return seen
+        return seen._replace(values=seen.counts.astype(np.float64))
 
-        Parameters
-        ----------
-        path : str or os.PathLike
-            Ending in .npz or .json or .parquet, which `load` reads back equal;
-            or in .csv, for other programs: a row per sample. Replaced if it exists.
-
-        Raises
-        ------
-        InvalidInput
-            Another file ending; a `SignedDistance` among the obstacles, whose
-            functions no file holds.
-        ImportError
-            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
-        OSError
-            The file cannot be written.
-        """
-        from tdcr._io.save_load import save
-
-        save(self, path)
-
-    @classmethod
-    def load(cls, path: str | PathLike[str]) -> Workspace:
-        """Read a workspace that `save` wrote. No code of a file is run.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            File ending in .npz or .json or .parquet.
-
-        Raises
-        ------
-        InvalidInput
-            Another file: names path and field, what was expected and what was there.
-        ImportError
-            .parquet without pyarrow, an optional extra: ``pip install tdcr[parquet]``.
-        OSError
-            The file cannot be read.
-        """
-        from tdcr._io.save_load import load
-
-        loaded: Workspace = load(path, "Workspace")
-        return loaded
+    def _title(self) -> str:
+        name = f"{self.robot.name}\n" if self.robot.name else ""
+        failed = len(self) - int(self.ok.sum())
+        lost = f", {failed:,} not converged" if failed else ""
+        return f"{name}{self.model} model, {len(self):,} samples{lost}"
 
     def _points(self) -> Floats:
         """Tips of the rows that converged, or say that there are none."""

@@ -1,4 +1,4 @@
-"""Where a robot's tip can get: many forward solves over ranges of displacements."""
+"""Workspace of a robot's tip: many forward solves over ranges of displacements."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from tdcr import _core
 from tdcr._base.arguments import numbers, several_obstacles, tendons_of, whole
-from tdcr._base.progress import told
+from tdcr._base.progress import progress_callback
 from tdcr._forward.chunks import Solver, spread
 from tdcr._workspace.results import Sampling, Workspace
 from tdcr.errors import InvalidInput
@@ -19,8 +19,8 @@ from tdcr.errors import InvalidInput
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from tdcr._base.models import Settings
     from tdcr._core import Loads, Obstacle, Robot
-    from tdcr._forward.batch import Settings
 
 __all__ = ["workspace"]
 
@@ -113,6 +113,7 @@ def workspace(
     >>> found.tips.shape, round(found.reach.farthest, 6)
     ((121, 3), 0.2)
     """
+    # Arguments, and the rows to solve.
     kind = _kind(sampling)
     limits = _limits(ranges, tendons_of(robot))
     count, size = whole("samples", samples, 1), whole("chunk", chunk, 1)
@@ -126,8 +127,9 @@ def workspace(
         name: np.empty((len(rows), *column.shape[1:]), column.dtype)
         for name, column in solver(rows[:0]).items()
     }
+    # Pieces, in the order in which they are done.
     done = 0
-    with told(progress, "workspace", len(rows)) as tell:
+    with progress_callback(progress, "workspace", len(rows)) as tell:
 
         def keep(start: int, piece: dict[str, NDArray[Any]]) -> None:
             nonlocal done

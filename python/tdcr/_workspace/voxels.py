@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from tdcr._base.value import rebuilt
+from tdcr._base.value import rebuild
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class Volume(NamedTuple):
     value: float
     """[m^3]."""
     error: float
-    """How far it moves when twice the voxel and when half of the samples is used [m^3]."""
+    """Change of the value when twice the voxel and when half of the samples is used [m^3]."""
     occupied: float
     """Volume of all voxels with a tip, more by the steps at the surface [m^3]."""
     voxel: float
@@ -56,7 +56,7 @@ class VoxelMap(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy with arrays that stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)
 
     def __repr__(self) -> str:
         """Tell how many voxels of which edge, and between what the values are."""
@@ -129,7 +129,7 @@ def default_voxel(points: Floats) -> float:
     return math.cbrt(box * _PER_VOXEL / len(points))
 
 
-def _counted(cells: Floats, voxel: float) -> tuple[tuple[int, int, int], Whole, Whole]:
+def _count(cells: Floats, voxel: float) -> tuple[tuple[int, int, int], Whole, Whole]:
     """Extent of a grid with an empty rim, its occupied cells in order and the points in each."""
     # The rim keeps neighbours of the last cell in a row apart from the first of the next.
     shape, keys = _keys(np.vstack([cells + 1.0, cells.max(axis=0) + 2.0]), voxel)
@@ -157,7 +157,7 @@ def _around(shape: tuple[int, int, int], keys: Whole, counts: Whole) -> Floats:
     return second / first
 
 
-def _filled(points: Floats, voxel: float) -> tuple[float, float]:
+def _fill(points: Floats, voxel: float) -> tuple[float, float]:
     """Volume of the voxels that are at least half full, and of all with a point.
 
     Mean over where the grid starts. Of the voxels that a smooth surface cuts, as many are more
@@ -167,7 +167,7 @@ def _filled(points: Floats, voxel: float) -> tuple[float, float]:
     low = points.min(axis=0)
     full = occupied = 0
     for offset in _OFFSETS:
-        shape, keys, counts = _counted(np.floor((points - low) / voxel + offset), voxel)
+        shape, keys, counts = _count(np.floor((points - low) / voxel + offset), voxel)
         full += int(np.count_nonzero(counts >= 0.5 * _around(shape, keys, counts)))
         occupied += len(keys)
     cell = voxel**3 / len(_OFFSETS)
@@ -176,11 +176,11 @@ def _filled(points: Floats, voxel: float) -> tuple[float, float]:
 
 def volume(points: Floats, voxel: float) -> Volume:
     """Estimate the volume that a cloud of points fills: see `Workspace.volume`."""
-    (fine, occupied), (coarse, _) = (_filled(points, voxel * scale) for scale in (1.0, 2.0))
+    (fine, occupied), (coarse, _) = (_fill(points, voxel * scale) for scale in (1.0, 2.0))
     # By chance, not by order: neighbours of a Sobol sequence or of a grid lie apart by design.
     first = np.random.default_rng(0).random(len(points)) < 0.5
     halves = [half for half in (points[first], points[~first]) if len(half)]
-    sparse = sum(_filled(half, voxel)[0] for half in halves) / len(halves)
+    sparse = sum(_fill(half, voxel)[0] for half in halves) / len(halves)
     error = abs(fine - coarse) + abs(fine - sparse)
     # So few that empty voxels may well be full, and those of twice the size too.
     if len(points) * voxel**3 < _FEW * occupied:

@@ -12,10 +12,11 @@
 
 from tdcr._base.public import set_home as _set_home
 from tdcr._core import PrebendSettings, RoutingSettings
-from tdcr.design.fit import Fit, fit
-from tdcr.design.prebend import Prebend, prebend
-from tdcr.design.routing import Routing, routing, routing_batch
+from tdcr.design import codecs as codecs
+from tdcr.design.fitting import Fit, fit
+from tdcr.design.prebending import Prebend, prebend
 from tdcr.design.targets import on_curve
+from tdcr.design.tendon_routing import Routing, routing, routing_batch
 
 __all__ = [
     "Fit",

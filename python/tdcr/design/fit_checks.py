@@ -1,16 +1,16 @@
-"""Checks of what a fit is given, and of what it leaves."""
+"""Checks of the arguments of a fit, and warnings of what it leaves."""
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from tdcr._core import Robot
+from tdcr.design.fit_problem import NAMES, PER_TENDON, Measured
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -18,75 +18,12 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["at_bounds", "checked", "far_off", "unsolved", "whole"]
-
-_PER_TENDON = ("offset", "gain", "radius", "azimuth", "stiffness")
-_NAMES = (*_PER_TENDON, "poisson_ratio", "rest", "base")
-# Measured points are no further from the base than so many lengths.
-_FARTHEST = 1e6
+__all__ = ["at_bounds", "check_problem", "far_off", "unsolved", "whole"]
 
 # Root mean square distances from which a fit is no description of what was measured: as a share of
 # the robot's length (calibrated models of a measured one leave 2 to 4 %), and in medians (normal
 # noise has 1.1 of them).
 _SHARE, _MEDIANS = 0.05, 10
-
-
-@dataclass(frozen=True)
-class Measured:
-    """Rows without gaps: displacements (rows, K) and points (rows, points, 3)."""
-
-    displacements: Array
-    points: Array
-    rows: NDArray[np.int64]
-    dropped: int
-
-    @staticmethod
-    def checked(robot: Robot, displacements: ArrayLike, measurements: ArrayLike) -> Measured:
-        """Check shapes and drop rows with gaps."""
-        pulls = _numbers("displacements", displacements)
-        points = _numbers("measurements", measurements)
-        tendons, disks = len(robot.tendons), robot.backbone.count + 1
-        if pulls.ndim != 2 or pulls.shape[1] != tendons:
-            message = f"displacements: expected shape (B, {tendons}), got shape {pulls.shape}"
-            raise InvalidInput(message, "displacements")
-        rows = len(pulls)
-        if rows == 0:
-            message = "measurements: expected at least one row, got none"
-            raise InvalidInput(message, "measurements")
-        if points.shape not in ((rows, 3), (rows, disks, 3)):
-            raise InvalidInput(
-                f"measurements: expected one row per displacement, shape ({rows}, 3) or "
-                f"({rows}, {disks}, 3), got shape {points.shape}",
-                "measurements",
-            )
-        if np.isinf(points).any():
-            message = "measurements: expected finite positions, or NaN for gaps, got inf"
-            raise InvalidInput(message, "measurements")
-        points = points.reshape(rows, -1, 3)
-        far = np.abs(points - robot.base[:3, 3]) / robot.backbone.total_length
-        if np.nanmax(far, initial=0.0) > _FARTHEST:
-            raise InvalidInput(
-                f"measurements: expected positions within {_FARTHEST:g} lengths of the robot from "
-                f"its base [m], got one {np.nanmax(far):.3g} lengths away",
-                "measurements",
-            )
-        full = ~np.isnan(points).any(axis=(1, 2)) & ~np.isnan(pulls).any(axis=1)
-        if not full.any():
-            message = f"measurements: expected a row without NaN, got none in {rows}"
-            raise InvalidInput(message, "measurements")
-        dropped = rows - int(full.sum())
-        return Measured(pulls[full], points[full], np.flatnonzero(full), dropped)
-
-
-def _numbers(argument: str, given: ArrayLike) -> Array:
-    try:
-        array = np.asarray(given)
-    except ValueError as error:
-        message = f"{argument}: expected a rectangular array of numbers, got {error}"
-        raise InvalidInput(message, argument) from None
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{argument}: expected numbers, got dtype {array.dtype}")
-    return array.astype(np.float64)
 
 
 def whole(argument: str, value: Any, least: int) -> int:
@@ -133,7 +70,7 @@ def unsolved(failed: int, rows: int) -> list[str]:
     return [f"the forward solve of {failed} of {rows} rows did not converge: see `failed`"]
 
 
-def checked(
+def check_problem(
     robot: Robot,
     displacements: ArrayLike,
     measurements: ArrayLike,
@@ -142,6 +79,7 @@ def checked(
     validation: float,
 ) -> tuple[list[str], Measured]:
     """Check what a fit is given, but for its counts."""
+    # Robot, model, share that is held out.
     if not isinstance(robot, Robot):
         raise TypeError(f"robot: expected Robot, got {type(robot).__name__}")
     if not isinstance(model, str):
@@ -154,18 +92,20 @@ def checked(
     if not 0 <= validation <= 0.9:
         message = f"validation: expected a share in [0, 0.9], got {validation!r}"
         raise InvalidInput(message, "validation")
+    # Names that the model knows, each once.
     if not isinstance(parameters, Iterable):
         raise TypeError(f"parameters: expected names, got {type(parameters).__name__}")
     names = [parameters] if isinstance(parameters, str) else list(parameters)
     for name in names:
         if not isinstance(name, str):
             raise TypeError(f"parameters: expected names, got {type(name).__name__} among them")
-    known = [n for n in _NAMES if model == "rod" or n not in ("stiffness", "poisson_ratio", "rest")]
+    known = [n for n in NAMES if model == "rod" or n not in ("stiffness", "poisson_ratio", "rest")]
     known_once = all(n in known and names.count(n) == 1 for n in names)
     if not names or not known_once:
         message = f"parameters: expected some of {known} for model {model!r}, each once"
         raise InvalidInput(f"{message}, got {parameters!r}", "parameters")
-    idle = [n for n in names if n in _PER_TENDON]
+    # Tendons that have what is fitted of them.
+    idle = [n for n in names if n in PER_TENDON]
     if idle and not robot.tendons:
         message = f"robot: expected tendons to fit {idle[0]} of, got a robot without any"
         raise InvalidInput(message, "robot")

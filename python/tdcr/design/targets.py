@@ -71,10 +71,10 @@ def on_curve(robot: Robot, points: ArrayLike, subsegment: str = "arc") -> Array:
 
 def wanted_places(robot: Robot, given: ArrayLike | Curve, subsegment: str) -> Array:
     """Find places of disks 1 to n from themselves, those of all disks or a curve, read-only."""
-    return _sample_curve(robot, given, subsegment) if callable(given) else _disks(robot, given)
+    return _sample(robot, given, subsegment) if callable(given) else _disks(robot, given)
 
 
-def _sample_curve(robot: Robot, curve: Curve, subsegment: str) -> Array:
+def _sample(robot: Robot, curve: Curve, subsegment: str) -> Array:
     """Places on a curve given as a function."""
     lengths = robot.backbone.arc_lengths
     stations = np.linspace(0.0, _BEYOND * lengths[-1], _SAMPLES * len(lengths))

@@ -22,7 +22,8 @@ flexible continuum robot simulating elephant trunk" (2014); their theta is half 
 from tdcr._base.public import set_home as _set_home
 from tdcr.planar.angle_function import AngleFunction, Curve
 from tdcr.planar.inverse import PlanarInverse, PlanarInverseBatch
-from tdcr.planar.trunk import PlanarShape, PlanarTrunk
+from tdcr.planar.shape import PlanarShape
+from tdcr.planar.trunk import PlanarTrunk
 from tdcr.planar.two_section import (
     Nearest,
     TwoSectionBatch,

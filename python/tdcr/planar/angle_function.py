@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from tdcr import _core
-from tdcr._base.value import Value, rebuilt
+from tdcr._base.value import Value, rebuild
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["AngleFunction", "Curve", "frozen"]
+__all__ = ["AngleFunction", "Curve", "read_only"]
 
 
 class Curve(NamedTuple):
@@ -32,7 +32,7 @@ class Curve(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy with arrays that stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -67,8 +67,8 @@ class AngleFunction(Value):
 
     def __init__(self, s: ArrayLike, angles: ArrayLike) -> None:
         object.__setattr__(self, "coefficients", _core._angle_coefficients(s, angles))
-        object.__setattr__(self, "s", frozen(s))
-        object.__setattr__(self, "angles", frozen(angles))
+        object.__setattr__(self, "s", read_only(s))
+        object.__setattr__(self, "angles", read_only(angles))
 
     def __call__(self, s: ArrayLike) -> Any:
         """Angle at arc lengths s [rad]: a float for a float, else an array of the same shape."""
@@ -105,7 +105,7 @@ class AngleFunction(Value):
         return f"<AngleFunction of {len(self.s)} nodes, s = {self.s[0]:g} ... {self.s[-1]:g} m>"
 
 
-def frozen(values: ArrayLike) -> Array:
+def read_only(values: ArrayLike) -> Array:
     """Return a read-only copy as float64."""
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False

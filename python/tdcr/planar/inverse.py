@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from tdcr import _core
-from tdcr._base.progress import told
+from tdcr._base.progress import progress_callback
 from tdcr._base.status import Status
 from tdcr._base.value import Value
 from tdcr._core import PsoSettings
@@ -18,7 +18,7 @@ from tdcr.errors import InvalidInput, NotConverged
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tdcr.planar.trunk import PlanarShape, PlanarTrunk
+    from tdcr.planar.shape import PlanarShape, Trunk
 
     Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ class PlanarInverse(Value):
 
     _hashed: ClassVar[tuple[str, ...]] = ("trunk", "turns", "method")
 
-    trunk: PlanarTrunk
+    trunk: Trunk
     turns: Array
     error: float
     heading_error: float
@@ -84,7 +84,7 @@ class PlanarInverse(Value):
 
     @property
     def ok(self) -> bool:
-        """Whether it converged."""
+        """True if it converged."""
         return self.status is Status.converged
 
     @property
@@ -99,7 +99,7 @@ class PlanarInverse(Value):
 
     @property
     def message(self) -> str:
-        """What stood in the way; empty when it converged."""
+        """Reason why it did not converge; empty when it converged."""
         if self.ok:
             return ""
         off = f"the tip is {self.error:g} m from the target"
@@ -145,7 +145,7 @@ class PlanarInverseBatch(Value, Sequence[PlanarInverse]):
 
     _hashed: ClassVar[tuple[str, ...]] = ("trunk", "points", "method")
 
-    trunk: PlanarTrunk
+    trunk: Trunk
     points: Array
     method: str
     settings: PsoSettings | None
@@ -215,7 +215,7 @@ class Swarm:
 
     @property
     def among(self) -> bool:
-        """Whether there are obstacles; what has no length is for the core to refuse."""
+        """Tell if there are obstacles; what has no length is for the core to refuse."""
         return not isinstance(self.obstacles, Sized) or len(self.obstacles) > 0
 
     def refuse(self) -> None:
@@ -278,7 +278,7 @@ def _check(method: str, starts: int | None, swarm: Swarm) -> None:
 
 
 def one(
-    trunk: PlanarTrunk,
+    trunk: Trunk,
     target: tuple[float, float, float | None],
     method: str,
     limit: ArrayLike,
@@ -290,14 +290,14 @@ def one(
     (x, y, heading), (tolerance, max_iterations, starts) = target, newton
     if method == "newton":
         answer = _core._planar_newton(
-            *trunk._given, x, y, heading, limit, tolerance, max_iterations, starts
+            *trunk._data, x, y, heading, limit, tolerance, max_iterations, starts
         )
         return PlanarInverse(trunk=trunk, method=method, **answer)
     settings = swarm.chosen()
     if swarm.seed is not None:
         settings = settings.replace(seed=swarm.seed)
     keywords = swarm.keywords(settings, tolerance, max_iterations)
-    answer = _core._planar_swarm(*trunk._given, x, y, heading, limit, keywords, swarm.callback)
+    answer = _core._planar_swarm(*trunk._data, x, y, heading, limit, keywords, swarm.callback)
     del answer["seed"]
     return PlanarInverse(
         trunk=trunk, method=method, settings=settings, objective=swarm.objective, **answer
@@ -305,7 +305,7 @@ def one(
 
 
 def many(
-    trunk: PlanarTrunk,
+    trunk: Trunk,
     points: ArrayLike,
     heading: ArrayLike | None,
     method: str,
@@ -318,9 +318,9 @@ def many(
     """Solve many targets."""
     _check(method, newton[2], swarm)
     settings, objective = None, None
-    goals = (*trunk._given, points, heading, limit)
+    goals = (*trunk._data, points, heading, limit)
     total = len(points) if isinstance(points, Sized) else None
-    with told(progress, "inverse_batch", total) as tell:
+    with progress_callback(progress, "inverse_batch", total) as tell:
         if method == "newton":
             table = _core._planar_newton_batch(*goals, *newton, threads, tell)
         else:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from tdcr import _core
-from tdcr._base.progress import told
-from tdcr._base.value import rebuilt
+from tdcr._base.progress import progress_callback
+from tdcr._base.value import rebuild
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -36,7 +36,7 @@ class Nearest(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy with arrays that stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)
 
 
 class TwoSectionBatch(NamedTuple):
@@ -51,7 +51,7 @@ class TwoSectionBatch(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy with arrays that stay read-only."""
-        return rebuilt, (type(self), *self)
+        return rebuild, (type(self), *self)
 
 
 def two_section_solutions(l1: float, l2: float, x: float, y: float, limit: float = tau) -> Array:
@@ -117,7 +117,7 @@ def two_section_batch(
         On Ctrl-C, within about 0.1 s.
     """
     total = len(targets) if isinstance(targets, Sized) else None
-    with told(progress, "two_section_batch", total) as tell:
+    with progress_callback(progress, "two_section_batch", total) as tell:
         turns, counts = _core._two_section_batch(l1, l2, targets, limit, threads, tell)
     row = np.repeat(np.arange(len(counts)), counts.astype(np.intp))
     row.flags.writeable = False

@@ -14,8 +14,8 @@ use tdcr::robot::rigid_motion;
 use crate::convert::arrays::{float_array, frozen, invalid, matrix4, values, wrong_shape};
 use crate::convert::interruptible;
 
-/// Rows up to which a call ends soon enough to go without listening for Ctrl-C.
-const SOON: usize = 10_000;
+/// Estimated time of a row of many tendons \[µs\]: one of three takes 0.6.
+const MICROSECONDS_PER_ROW: f64 = 5.0;
 
 /// Rows from one look at the stop flag to the next.
 const STRIDE: usize = 256;
@@ -66,17 +66,13 @@ fn check_overflow(argument: &str, answer: &[f64]) -> PyResult<()> {
     Err(invalid(&InvalidInput::new(argument, expected, "one that overflows")))
 }
 
-/// Runs a job without the GIL; a long one listens for Ctrl-C.
+/// Runs a job over rows, where Ctrl-C can stop it if they are many.
 fn run<T: Send>(
     py: Python<'_>,
     rows: usize,
     job: impl FnOnce(&Control) -> T + Send,
 ) -> PyResult<T> {
-    if rows > SOON {
-        interruptible::run(py, None, job)
-    } else {
-        Ok(py.detach(|| job(&Control::default())))
-    }
+    interruptible::run_if_long(py, rows as f64 * MICROSECONDS_PER_ROW, job)
 }
 
 fn pose(argument: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {

@@ -34,25 +34,23 @@ mod _core {
     #[pymodule_export]
     use crate::design::routing::{_routing, _routing_batch};
     #[pymodule_export]
-    use crate::forward::batch::{_fields, _forward_batch};
+    use crate::forward::batch::{_chained_shape, _fields, _forward_batch};
     #[pymodule_export]
     use crate::forward::forward;
     #[pymodule_export]
     use crate::forward::jacobian::jacobian;
     #[pymodule_export]
-    use crate::forward::rod::_chained_shape;
-    #[pymodule_export]
     use crate::forward::sensitivity::{Sensitivity, sensitivity};
     #[pymodule_export]
-    use crate::forward::shape::{_rotation_vector, Shape};
+    use crate::forward::shape::Shape;
     #[pymodule_export]
-    use crate::forward::shape_parts::_shape;
+    use crate::forward::shape_parts::{_rotation_vector, _shape};
     #[pymodule_export]
     use crate::inverse::batch::_inverse_batch;
     #[pymodule_export]
     use crate::inverse::cartesian_path::cartesian_path;
     #[pymodule_export]
-    use crate::inverse::{_inverse, _inverse_places, _inverse_solutions};
+    use crate::inverse::{_inverse, _inverse_solutions};
     #[pymodule_export]
     use crate::planar::inverse::{
         _planar_clearance, _planar_inverse_defaults, _planar_newton, _planar_newton_batch,

@@ -1,6 +1,6 @@
 //! The engine of `tdcr.pso.minimize`: a swarm over a Python function.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -8,12 +8,10 @@ use pyo3::types::PyTuple;
 
 use tdcr::solve::pso::{Objective, Progress, Swarm};
 
-use crate::convert::arguments::returned;
+use crate::convert::arguments::number_of_point;
 use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
+use crate::convert::interruptible::POLL;
 use crate::settings::pso::PsoSettings;
-
-/// How often progress is told.
-const POLL: Duration = Duration::from_millis(50);
 
 /// A Python function with those who follow the run.
 struct Function<'a, 'py> {
@@ -21,7 +19,7 @@ struct Function<'a, 'py> {
     vectorized: bool,
     callback: Option<&'a Bound<'py, PyAny>>,
     progress: Option<&'a Bound<'py, PyAny>>,
-    told: Instant,
+    last_report: Instant,
 }
 
 impl Function<'_, '_> {
@@ -30,7 +28,7 @@ impl Function<'_, '_> {
         // A new array every time: the function may keep it.
         let value = self.f.call1((PyArray1::from_slice(py, point),))?;
         let expected = "one number for a point (vectorized=True takes all points at once)";
-        returned("f", expected, &value)
+        number_of_point("f", expected, &value)
     }
 
     fn all(&self, points: &[f64], dimensions: usize, values_out: &mut [f64]) -> PyResult<()> {
@@ -68,10 +66,10 @@ impl Objective for Function<'_, '_> {
         py.detach(|| ());
         py.check_signals()?;
         if let Some(tell) = self.progress
-            && self.told.elapsed() >= POLL
+            && self.last_report.elapsed() >= POLL
         {
             tell.call1((progress.iteration,))?;
-            self.told = Instant::now();
+            self.last_report = Instant::now();
         }
         match self.callback {
             Some(callback) => callback.call1((progress.iteration, progress.value))?.is_truthy(),
@@ -102,7 +100,7 @@ pub(crate) fn _pso_minimize<'py>(
         let points = rows("start", points, lower.len())?;
         swarm.start_from(&points).map_err(|e| invalid(&e))?;
     }
-    let mut function = Function { f, vectorized, callback, progress, told: Instant::now() };
+    let mut function = Function { f, vectorized, callback, progress, last_report: Instant::now() };
     let report = swarm.run(&mut function)?;
     if let Some(tell) = progress {
         tell.call1((report.iterations,))?;

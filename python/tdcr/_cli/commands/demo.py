@@ -12,7 +12,8 @@ import click
 
 import tdcr
 from tdcr import Robot
-from tdcr._cli import options as own
+from tdcr._cli import options
+from tdcr._cli import output as out
 
 __all__ = ["demo"]
 
@@ -23,7 +24,9 @@ DEMO = (
 )
 
 
-@click.command("demo", epilog=own.examples("demo --files .", "demo --output pictures", files=False))
+@click.command(
+    "demo", epilog=options.examples("demo --files .", "demo --output pictures", files=False)
+)
 @click.option(
     "--files",
     type=click.Path(file_okay=False, path_type=Path),
@@ -40,7 +43,7 @@ def demo(files: Path | None, output: Path | None) -> int:
     """Solve the bundled robots and print where their tips are (position, rotation vector)."""
     from tdcr._cli.report import shape as report
 
-    own.checked_picture(None if output is None else "robot.png")
+    out.check_picture(None if output is None else "robot.png")
     if files is not None:
         _write_files(files)
         return 0
@@ -50,14 +53,14 @@ def demo(files: Path | None, output: Path | None) -> int:
         with resources.as_file(resource) as path:
             robot = Robot.load(path)
         shapes.append(tdcr.forward(robot, displacements))
-        times.append(min(_timed(robot, displacements) for _ in range(10)))
+        times.append(min(_time(robot, displacements) for _ in range(10)))
     report.print_demo(shapes, times)
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
         for (name, _), shape in zip(DEMO, shapes, strict=True):
-            own.picture_of(shape)(str(output / f"{name}.png"))
+            out.picture_of(shape)(str(output / f"{name}.png"))
             click.echo(f"picture: {output / name}.png")
-    return max(own.said(s.ok, s.robot.name, s.status, s.message) for s in shapes)
+    return max(out.report_outcome(s.ok, s.robot.name, s.status, s.message) for s in shapes)
 
 
 def _write_files(folder: Path) -> None:
@@ -71,11 +74,11 @@ def _write_files(folder: Path) -> None:
             raise click.UsageError(f"{path}: expected no such file, or the one of the examples")
     folder.mkdir(parents=True, exist_ok=True)
     for name in sorted(texts):
-        own.write_text(str(folder / name), texts[name])
+        out.write_text(str(folder / name), texts[name])
         click.echo(f"written: {folder / name}")
 
 
-def _timed(robot: Robot, displacements: Sequence[float]) -> float:
+def _time(robot: Robot, displacements: Sequence[float]) -> float:
     start = perf_counter()
     tdcr.forward(robot, displacements)
     return perf_counter() - start

@@ -8,12 +8,17 @@ from typing import Any
 import click
 
 from tdcr import InvalidInput, Robot, RoutingSettings
-from tdcr._cli import options as own
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command, Commands
+from tdcr._io.lengths import to_metres
 
 __all__ = ["design"]
 
-_TARGET = click.argument("target", type=own.FILE)
+_EXAMPLE = options.examples(
+    "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
+)
+_TARGET = click.argument("target", type=options.FILE)
 _CURVE = click.option(
     "--curve",
     is_flag=True,
@@ -24,7 +29,7 @@ _CURVE = click.option(
 @click.group(
     "design",
     cls=Commands,
-    epilog=own.examples(
+    epilog=options.examples(
         "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
     ),
 )
@@ -32,9 +37,9 @@ def design() -> None:
     """Find the robot that takes a wanted shape."""
 
 
-def _wanted(robot: Robot, target: Path, unit: str | None, curve: bool) -> tuple[Any, str]:
+def _read_places(robot: Robot, target: Path, unit: str | None, curve: bool) -> tuple[Any, str]:
     """Places of disks from a file, and the unit of the table."""
-    places, unit = own.points(target, unit)
+    places, unit = options.read_targets(target, unit)
     count = robot.backbone.count
     if curve:
         from tdcr.design import on_curve
@@ -49,35 +54,35 @@ def _wanted(robot: Robot, target: Path, unit: str | None, curve: bool) -> tuple[
     return places, unit
 
 
-def _done(found: Any, unit: str, json_file: str | None, files: tuple[str | None, ...]) -> int:
+def _finish(found: Any, unit: str, json_file: str | None, files: tuple[str | None, ...]) -> int:
     from tdcr._cli.report import results as report
 
     output, plot_file = files
-    own.delivered(
+    out.deliver(
         lambda: report.design_json(found),
         lambda: report.print_design(found, unit),
         json_file,
         (output, found.robot.save),
-        (plot_file, own.picture_of(found.shape, found.target_positions)),
+        (plot_file, out.picture_of(found.shape, found.target_positions)),
     )
-    return own.said(found.ok, found.robot.name, found.status, found.message)
+    return out.report_outcome(found.ok, found.robot.name, found.status, found.message)
 
 
 @design.command(
     "prebend",
     cls=Command,
-    epilog=own.examples(
+    epilog=options.examples(
         "design prebend finger.toml curve.csv --curve --pull -3 --output bent.toml"
     ),
 )
-@own.ROBOT
+@options.ROBOT
 @_TARGET
-@own.displacements_option()
+@options.displacements_option()
 @_CURVE
-@own.target_option
-@own.json_option
-@own.picture_option
-@own.output_option("the robot with its new rest shape", ".toml", ".json")
+@options.target_option
+@options.json_option
+@options.picture_option
+@options.output_option("the robot with its new rest shape", ".toml", ".json")
 def prebend(
     robot: Path,
     target: Path,
@@ -95,21 +100,21 @@ def prebend(
     """
     from tdcr.design import prebend as solve
 
-    own.checked_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
-    places, unit = _wanted(arm, target, unit, curve)
-    found = solve(arm, places, own.in_metres(displacements, unit))
-    return _done(found, unit, json_file, (output, plot_file))
+    places, unit = _read_places(arm, target, unit, curve)
+    found = solve(arm, places, to_metres(displacements, unit))
+    return _finish(found, unit, json_file, (output, plot_file))
 
 
 @design.command(
     "routing",
     cls=Command,
-    epilog=own.examples(
+    epilog=options.examples(
         "design routing finger.toml places.csv --holes 12 --bounds -10 0 --output routed.toml"
     ),
 )
-@own.ROBOT
+@options.ROBOT
 @_TARGET
 @click.option(
     "--holes",
@@ -118,12 +123,12 @@ def prebend(
     show_default=True,
     help="Holes per disk, evenly spaced; 0 allows any azimuth.",
 )
-@own.BOUNDS
+@options.BOUNDS
 @_CURVE
-@own.target_option
-@own.json_option
-@own.picture_option
-@own.output_option("the robot with its new routing", ".toml", ".json")
+@options.target_option
+@options.json_option
+@options.picture_option
+@options.output_option("the robot with its new routing", ".toml", ".json")
 def routing(
     robot: Path,
     target: Path,
@@ -141,10 +146,10 @@ def routing(
     """
     from tdcr.design import routing as solve
 
-    own.checked_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
-    places, unit = _wanted(arm, target, unit, curve)
-    limits = None if bounds is None else tuple(own.in_metres(bounds, unit))
+    places, unit = _read_places(arm, target, unit, curve)
+    limits = None if bounds is None else tuple(to_metres(bounds, unit))
     settings = RoutingSettings(holes=holes or None)
     found = solve(arm, places, bounds=limits, settings=settings)  # type: ignore[arg-type]
-    return _done(found, unit, json_file, (output, plot_file))
+    return _finish(found, unit, json_file, (output, plot_file))

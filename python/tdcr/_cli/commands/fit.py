@@ -9,7 +9,8 @@ from typing import Any
 import click
 
 from tdcr import InvalidInput, Robot, read_measurements
-from tdcr._cli import options as own
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command
 
 __all__ = ["fit"]
@@ -25,13 +26,13 @@ def _names(
 @click.command(
     "fit",
     cls=Command,
-    epilog=own.examples(
+    epilog=options.examples(
         "fit finger.toml bench.csv --unit mm --pull-sign positive --parameters gain "
         "--output fitted.toml"
     ),
 )
-@own.ROBOT
-@click.argument("measurements", type=own.FILE)
+@options.ROBOT
+@click.argument("measurements", type=options.FILE)
 @click.option(
     "--unit",
     type=click.Choice(["m", "cm", "mm", "um", "in"]),
@@ -70,14 +71,14 @@ def _names(
     metavar="LENGTH",
     help="Tendons released by this much or more, in --unit, are slack.",
 )
-@own.model_option("rod", "constant_curvature")
+@options.model_option("rod", "constant_curvature")
 @click.option(
     "--validation", type=float, default=0.2, show_default=True, help="Share of rows held out."
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the rows held out.")
-@own.json_option
-@own.picture_option
-@own.output_option("the fitted robot", ".toml", ".json")
+@options.json_option
+@options.picture_option
+@options.output_option("the fitted robot", ".toml", ".json")
 def fit(
     robot: Path,
     measurements: Path,
@@ -85,7 +86,7 @@ def fit(
     json_file: str | None,
     plot_file: str | None,
     output: str | None,
-    **options: Any,
+    **given: Any,
 ) -> int:
     """Estimate parameters of the robot in file ROBOT from the CSV file MEASUREMENTS.
 
@@ -96,17 +97,18 @@ def fit(
     from tdcr._plot.shape import save_figure
     from tdcr.design import fit as solve
 
-    own.checked_picture(plot_file)
+    # Measurements, with a column for every tendon.
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
-    unit = options["unit"]
+    unit = given["unit"]
     with warnings.catch_warnings(record=True, action="always") as doubts:
         measured = read_measurements(
             measurements,
             unit=unit,
-            pull_sign=options["pull_sign"],
-            displacements=options["displacement_columns"],
-            positions=options["position_columns"],
-            free_from=options["free_from"],
+            pull_sign=given["pull_sign"],
+            displacements=given["displacement_columns"],
+            positions=given["position_columns"],
+            free_from=given["free_from"],
         )
     columns = measured.displacement_columns
     if len(columns) != len(arm.tendons):
@@ -116,28 +118,30 @@ def fit(
             f"got {', '.join(columns)}; name them with --displacement-columns",
             "displacements",
         )
+    # The sign of pulls.
     slack = not (measured.displacements < 0.0).any()
-    if slack and options["model"] == "rod" and "offset" not in parameters:
+    if slack and given["model"] == "rod" and "offset" not in parameters:
         # Slack tendons tell nothing: the parameters would stay what they were.
-        other = {"positive": "negative", "negative": "positive"}[options["pull_sign"]]
+        other = {"positive": "negative", "negative": "positive"}[given["pull_sign"]]
         message = f"{measurements}: expected a pull, got releases alone: try --pull-sign {other}"
         raise InvalidInput(message, "pull_sign")
     for doubt in doubts:
-        own.warn(doubt.message)
+        out.warn(doubt.message)
+    # The fit, and its files and table.
     found = solve(
         arm,
         measured,
         parameters,
-        model=options["model"],
-        validation=options["validation"],
-        seed=options["seed"],
+        model=given["model"],
+        validation=given["validation"],
+        seed=given["seed"],
     )
     shown = "m" if unit == "m" else "mm"
-    own.delivered(
+    out.deliver(
         lambda: report.fit_json(found, measured),
         lambda: report.print_fit(found, measured, shown),
         json_file,
         (output, found.robot.save),
         (plot_file, lambda path: save_figure(found.plot().figure, path)),
     )
-    return own.said(found.ok, arm.name, found.status, found.message)
+    return out.report_outcome(found.ok, arm.name, found.status, found.message)

@@ -8,9 +8,13 @@ import click
 
 import tdcr
 from tdcr import Robot
-from tdcr._cli import options as own
+from tdcr._base.models import MODELS
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command
-from tdcr._io.obstacle_file import obstacles_option, read_obstacles
+from tdcr._io.lengths import to_metres
+from tdcr._io.obstacle_file import read_obstacles
+from tdcr._io.save_load import json_text
 
 __all__ = ["forward", "schema"]
 
@@ -18,20 +22,20 @@ __all__ = ["forward", "schema"]
 @click.command(
     "forward",
     cls=Command,
-    epilog=own.examples(
+    epilog=options.examples(
         "forward trunk.toml -d -15 free free free -5 free --unit mm --output pulled.npz",
         "forward trunk.toml -d -15 free free free free free --unit mm --obstacles bar.toml "
         "--output leaning.npz",
     ),
 )
-@own.ROBOT
-@own.displacements_option()
-@own.model_option("rod", "linkage", "constant_curvature")
-@own.unit_option("the displacements")
-@obstacles_option
-@own.json_option
-@own.picture_option
-@own.output_option("the shape", ".npz", ".json", ".csv")
+@options.ROBOT
+@options.displacements_option()
+@options.model_option(*MODELS)
+@options.unit_option("the displacements")
+@options.obstacles_option
+@options.json_option
+@options.picture_option
+@options.output_option("the shape", ".npz", ".json", ".csv")
 def forward(
     robot: Path,
     displacements: list[float],
@@ -45,26 +49,26 @@ def forward(
     """Solve the shape of the robot in file ROBOT (.toml or .json)."""
     from tdcr._cli.report import shape as report
 
-    own.checked_picture(plot_file)
-    pulls = own.in_metres(displacements, unit)
+    out.check_picture(plot_file)
+    pulls = to_metres(displacements, unit)
     arm, around = Robot.load(robot), read_obstacles(obstacles)
     shape = tdcr.forward(arm, pulls, model=model, obstacles=around)
-    own.delivered(
-        lambda: report.as_json(shape),
+    out.deliver(
+        lambda: json_text(shape),
         lambda: report.print_shape(shape, unit),
         json_file,
         (output, shape.save),
-        (plot_file, own.picture_of(shape)),
+        (plot_file, out.picture_of(shape)),
     )
-    doubt = own.unit_doubted(unit, own.largest(pulls), shape.robot)
-    return own.said(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
+    doubt = out.doubt_unit(unit, out.largest_size(pulls), shape.robot)
+    return out.report_outcome(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
 
 
-@click.command("schema", epilog=own.examples("schema --output robot.schema.json", files=False))
+@click.command("schema", epilog=options.examples("schema --output robot.schema.json", files=False))
 @click.option(
     "-o",
     "--output",
-    callback=own.writable,
+    callback=out.check_writable,
     metavar="FILE",
     help="Write there instead of to stdout.",
 )
@@ -78,4 +82,4 @@ def schema(output: str | None) -> None:
     if output is None:
         click.echo(text.encode())
     else:
-        own.write_text(output, text + "\n")
+        out.write_text(output, text + "\n")

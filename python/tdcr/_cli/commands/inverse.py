@@ -9,9 +9,11 @@ import click
 
 import tdcr
 from tdcr import InvalidInput, Robot
-from tdcr._cli import options as own
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command, Numbers
-from tdcr._io.obstacle_file import obstacles_option, read_obstacles
+from tdcr._io.lengths import to_metres
+from tdcr._io.obstacle_file import read_obstacles
 
 __all__ = ["inverse", "track"]
 
@@ -19,12 +21,12 @@ __all__ = ["inverse", "track"]
 @click.command(
     "inverse",
     cls=Command,
-    epilog=own.examples(
+    epilog=options.examples(
         "inverse trunk.toml --position 60 20 170 --unit mm",
         "inverse trunk.toml --position 0 0 0.2 --rotation 0 0 0 --model constant_curvature",
     ),
 )
-@own.ROBOT
+@options.ROBOT
 @click.option(
     "--position",
     cls=Numbers,
@@ -41,17 +43,17 @@ __all__ = ["inverse", "track"]
 )
 @click.option(
     "--pose",
-    type=own.FILE,
+    type=options.FILE,
     metavar="FILE",
     help="Instead: the 4x4 frame of the tool by rows, numbers with commas or spaces between them.",
 )
-@own.model_option("rod", "constant_curvature")
-@own.BOUNDS
-@own.unit_option("the position, the bounds, the last column of a pose")
-@obstacles_option
-@own.json_option
-@own.picture_option
-@own.output_option("the answer", ".npz", ".json")
+@options.model_option("rod", "constant_curvature")
+@options.BOUNDS
+@options.unit_option("the position, the bounds, the last column of a pose")
+@options.obstacles_option
+@options.json_option
+@options.picture_option
+@options.output_option("the answer", ".npz", ".json")
 def inverse(
     robot: Path,
     position: list[float] | None,
@@ -70,7 +72,7 @@ def inverse(
 
     if (position is None) == (pose is None) or (pose is not None and rotation is not None):
         raise click.UsageError("expected --position X Y Z, with or without --rotation, or --pose")
-    own.checked_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
     target = _pose(pose, unit) if pose is not None else _target(position, rotation, unit)
     answer = tdcr.inverse(
@@ -81,19 +83,19 @@ def inverse(
         obstacles=read_obstacles(obstacles),
     )
     marks = answer.target[None, :3, 3] if answer.target.ndim == 2 else answer.target[None]
-    own.delivered(
+    out.deliver(
         lambda: report.inverse_json(answer),
         lambda: report.print_inverse(answer, unit),
         json_file,
         (output, answer.save),
-        (plot_file, lambda path: own.picture_of(answer.shape, marks)(path)),
+        (plot_file, lambda path: out.picture_of(answer.shape, marks)(path)),
     )
-    doubt = own.unit_doubted(unit, answer.error, arm, times=20)
-    return own.said(answer.ok, arm.name, answer.status, answer.message + doubt)
+    doubt = out.doubt_unit(unit, answer.error, arm, times=20)
+    return out.report_outcome(answer.ok, arm.name, answer.status, answer.message + doubt)
 
 
 def _bounds(bounds: list[float] | None, unit: str) -> Any:
-    return None if bounds is None else tuple(own.in_metres(bounds, unit))
+    return None if bounds is None else tuple(to_metres(bounds, unit))
 
 
 def _target(position: Any, rotation: Any, unit: str) -> Any:
@@ -101,7 +103,7 @@ def _target(position: Any, rotation: Any, unit: str) -> Any:
 
     from tdcr._base import rotations
 
-    place = np.array(own.in_metres(position, unit))
+    place = np.array(to_metres(position, unit))
     if rotation is None:
         return place
     frame = np.eye(4)
@@ -121,30 +123,30 @@ def _pose(path: Path, unit: str) -> Any:
     if frame.shape != (4, 4):
         message = f"{path}: expected four rows of four numbers, a homogeneous matrix"
         raise InvalidInput(message, "pose")
-    frame[:3, 3] = own.in_metres(frame[:3, 3].tolist(), unit)
+    frame[:3, 3] = to_metres(frame[:3, 3].tolist(), unit)
     return frame
 
 
 @click.command(
     "track",
     cls=Command,
-    epilog=own.examples("track trunk.toml path.csv --output pulls.csv"),
+    epilog=options.examples("track trunk.toml path.csv --output pulls.csv"),
 )
-@own.ROBOT
-@click.argument("path", type=own.FILE)
-@own.model_option("rod", "constant_curvature")
-@own.BOUNDS
-@own.target_option
+@options.ROBOT
+@click.argument("path", type=options.FILE)
+@options.model_option("rod", "constant_curvature")
+@options.BOUNDS
+@options.target_option
 @click.option(
     "--step",
     type=float,
     metavar="LENGTH",
     help="Go from point to point in straight lines, by at most so much in a row, in --unit.",
 )
-@obstacles_option
-@own.json_option
-@own.picture_option
-@own.output_option("the pulls of every row", ".csv", ".npz", ".json", ".parquet")
+@options.obstacles_option
+@options.json_option
+@options.picture_option
+@options.output_option("the pulls of every row", ".csv", ".npz", ".json", ".parquet")
 def track(
     robot: Path,
     path: Path,
@@ -164,24 +166,24 @@ def track(
     """
     from tdcr._cli.report import results as report
 
-    own.checked_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
-    targets, unit = own.points(path, unit)
+    targets, unit = options.read_targets(path, unit)
     if step is not None:
-        targets = tdcr.cartesian_path(targets, *own.in_metres([step], unit))
+        targets = tdcr.cartesian_path(targets, *to_metres([step], unit))
     found = tdcr.track(
         arm,
         targets,
         model=model,
         bounds=_bounds(bounds, unit),
         obstacles=read_obstacles(obstacles),
-        progress=own.progress(),
+        progress=out.shows_progress(),
     )
-    own.delivered(
+    out.deliver(
         lambda: report.track_json(found),
         lambda: report.print_track(found, unit),
         json_file,
         (output, found.save),
-        (plot_file, lambda path: own.picture_of(found[-1].shape, targets)(path)),
+        (plot_file, lambda path: out.picture_of(found[-1].shape, targets)(path)),
     )
-    return own.rows_said(found, own.unit_doubted(unit, float(found.error.max()), arm, times=20))
+    return out.report_rows(found, out.doubt_unit(unit, float(found.error.max()), arm, times=20))

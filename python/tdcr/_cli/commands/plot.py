@@ -10,9 +10,13 @@ import click
 import numpy as np
 
 import tdcr
-from tdcr import InvalidInput, Inverse, InverseBatch, Robot, Shape, ShapeBatch, Workspace
-from tdcr._cli import options as own
+from tdcr import Grasp, InvalidInput, InverseBatch, Robot, Shape, ShapeBatch, Workspace
+from tdcr._base.models import MODELS
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command
+from tdcr._io.lengths import to_metres
+from tdcr.design import Fit
 
 __all__ = ["plot"]
 
@@ -20,28 +24,28 @@ __all__ = ["plot"]
 @click.command(
     "plot",
     cls=Command,
-    epilog=own.examples(
+    epilog=options.examples(
         "plot trunk.toml --pull -15 free free free -5 free --unit mm --output pulled.png",
         "plot trunk.toml --pull -15 free free free -9 free --unit mm --animate pull.gif",
     ),
 )
-@click.argument("file", type=own.FILE)
+@click.argument("file", type=options.FILE)
 @click.option(
     "-o",
     "--output",
-    callback=own.writable,
+    callback=out.check_writable,
     metavar="FILE",
     help="The picture: .png, .pdf, .svg, ...",
 )
 @click.option(
     "--animate",
-    callback=own.writable,
+    callback=out.check_writable,
     metavar="FILE",
     help="Of a robot: a GIF of the pull, from rest.",
 )
-@own.displacements_option(required=False)
-@own.model_option("rod", "linkage", "constant_curvature")
-@own.unit_option("the displacements")
+@options.displacements_option(required=False)
+@options.model_option(*MODELS)
+@options.unit_option("the displacements")
 @click.option(
     "--view",
     type=click.Choice(["auto", "2d", "3d"]),
@@ -72,21 +76,28 @@ def plot(
 ) -> int:
     """Draw what is in FILE: a robot, or a result that was saved.
 
-    A robot (.toml, .json) is drawn under --pull, or at rest; results are shapes, inverses, batches
-    and workspaces (.npz, .json, .parquet).
+    A robot (.toml, .json) is drawn under --pull, or at rest; results are shapes, inverses, batches,
+    workspaces, designs, fits and grasps (.npz, .json, of workspaces .parquet).
     """
     if output is None and animate is None:
         raise click.UsageError("expected --output FILE, --animate FILE or both")
-    own.checked_picture(output)
+    out.check_picture(output)
+    # A robot or a result, and options that suit it.
     thing = _read(file)
     if not isinstance(thing, Robot) and (displacements is not None or animate is not None):
         got = f"{file} with a {type(thing).__name__}"
         raise click.UsageError(f"--pull and --animate: expected a robot file, got {got}")
-    _used(context, thing)
+    _check_options(context, thing)
     if isinstance(thing, Workspace):
-        own.workspace_picture(thing, str(output), "3d" if view == "3d" else "section")
+        out.save_workspace(thing, str(output), "3d" if view == "3d" else "section")
         return 0
-    pulls = None if displacements is None else own.in_metres(displacements, unit)
+    if isinstance(thing, (Fit, Grasp)):
+        from tdcr._plot.shape import save_drawing
+
+        save_drawing(lambda ax: thing.plot(ax=ax), str(output), flat=isinstance(thing, Fit))
+        return 0
+    # Shapes, of a robot solved now.
+    pulls = None if displacements is None else to_metres(displacements, unit)
     if animate is not None:
         _animate(thing, pulls, model, animate, frames)
     shape = _shape(thing, pulls, model, row)
@@ -94,11 +105,11 @@ def plot(
         from tdcr._plot.shape import save_picture
 
         save_picture(shape, output, view=view)
-    doubt = own.unit_doubted(unit, own.largest(pulls or ()), shape.robot)
-    return own.said(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
+    doubt = out.doubt_unit(unit, out.largest_size(pulls or ()), shape.robot)
+    return out.report_outcome(shape.ok, shape.robot.name, shape.status, shape.message + doubt)
 
 
-def _used(context: click.Context, thing: Any) -> None:
+def _check_options(context: click.Context, thing: Any) -> None:
     """Refuse options that would be without use."""
     given = {
         name
@@ -123,9 +134,9 @@ def _read(file: Path) -> Any:
     from tdcr._io.save_load import load_any
 
     if file.suffix.lower() == ".json":
-        from tdcr._io.robot_file import parsed
+        from tdcr._io.text_file import parse
 
-        data = parsed(file, file.read_bytes(), ".json")
+        data = parse(file, file.read_bytes(), ".json")
         if isinstance(data, dict) and "kind" not in data:
             return Robot.load(file)
     elif file.suffix.lower() not in (".npz", ".parquet"):
@@ -143,12 +154,12 @@ def _shape(thing: Any, pulls: list[float] | None, model: str, row: int | None) -
         thing = thing[row]
     if isinstance(thing, Robot):
         return tdcr.forward(thing, pulls or [inf] * len(thing.tendons), model=model)
-    shape: Shape = thing.shape if isinstance(thing, Inverse) else thing
+    shape: Shape = thing if isinstance(thing, Shape) else thing.shape
     return shape
 
 
 def _animate(robot: Robot, pulls: list[float] | None, model: str, path: str, frames: int) -> None:
-    from tdcr._base.progress import told
+    from tdcr._base.progress import progress_callback
     from tdcr._plot.animation import animate_pull, check_gif, pulled_shapes
 
     if pulls is None:
@@ -156,7 +167,7 @@ def _animate(robot: Robot, pulls: list[float] | None, model: str, path: str, fra
     check_gif(path)
     # Checked as a whole before the first step.
     tdcr.forward(robot, pulls, model=model)
-    with told(own.progress(), "plot", 2 * frames) as tell:
+    with progress_callback(out.shows_progress(), "plot", 2 * frames) as tell:
         shapes = pulled_shapes(robot, np.array(pulls), model=model, count=frames, progress=tell)
         shown = None if tell is None else (lambda done: tell(frames + done))
         animate_pull(shapes, path, progress=shown)

@@ -9,9 +9,12 @@ import click
 
 import tdcr
 from tdcr import Robot
-from tdcr._cli import options as own
+from tdcr._base.models import MODELS
+from tdcr._cli import options
+from tdcr._cli import output as out
 from tdcr._cli.click_types import Command, Numbers, read_numbers
-from tdcr._io.obstacle_file import obstacles_option, read_obstacles
+from tdcr._io.lengths import to_metres
+from tdcr._io.obstacle_file import read_obstacles
 
 __all__ = ["workspace"]
 
@@ -35,12 +38,12 @@ def _ranges(
 @click.command(
     "workspace",
     cls=Command,
-    epilog=own.examples(
+    epilog=options.examples(
         "workspace trunk.toml --ranges -10:0 free free free -6:0 free --unit mm "
         "--samples 2000 --sampling random --output cloud.npz"
     ),
 )
-@own.ROBOT
+@options.ROBOT
 @click.option(
     "--ranges",
     cls=Numbers,
@@ -59,11 +62,11 @@ def _ranges(
     help="How displacements are drawn; sobol needs scipy.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Of sobol and random.")
-@own.model_option("rod", "linkage", "constant_curvature")
-@own.unit_option("the ranges")
-@obstacles_option
-@own.json_option
-@own.picture_option
+@options.model_option(*MODELS)
+@options.unit_option("the ranges")
+@options.obstacles_option
+@options.json_option
+@options.picture_option
 @click.option(
     "--view",
     type=click.Choice(["section", "3d"]),
@@ -71,7 +74,7 @@ def _ranges(
     show_default=True,
     help="Of the picture.",
 )
-@own.output_option("the samples", ".npz", ".json", ".csv", ".parquet")
+@options.output_option("the samples", ".npz", ".json", ".csv", ".parquet")
 def workspace(
     robot: Path,
     ranges: list[tuple[float, float]],
@@ -89,13 +92,14 @@ def workspace(
     """Sample where the tip of the robot in file ROBOT gets."""
     from tdcr._cli.report import results as report
 
-    own.checked_picture(plot_file)
+    out.check_picture(plot_file)
     arm = Robot.load(robot)
     if len(ranges) == 1:
         ranges = ranges * len(arm.tendons)
-    limits = [tuple(own.in_metres(pair, unit)) for pair in ranges]
+    limits = [tuple(to_metres(pair, unit)) for pair in ranges]
     if all(pair == (inf, inf) for pair in limits):
         raise click.BadParameter("expected a tendon that is not free", param_hint="--ranges")
+    # Samples, and their files and table.
     found = tdcr.workspace(
         arm,
         limits,
@@ -104,16 +108,19 @@ def workspace(
         seed=seed,
         model=model,
         obstacles=read_obstacles(obstacles),
-        progress=own.progress(),
+        progress=out.shows_progress(),
     )
     nothing = plot_file is not None and not found.ok.any()
-    own.delivered(
+    out.deliver(
         lambda: report.workspace_json(found),
         lambda: report.print_workspace(found, unit),
         json_file,
         (output, found.save),
-        (None if nothing else plot_file, lambda path: own.workspace_picture(found, path, view)),
+        (
+            None if nothing else plot_file,
+            lambda path: out.save_workspace(found, path, view),
+        ),
     )
-    longest = own.largest(end for pair in limits for end in pair)
-    doubt = own.unit_doubted(unit, longest, arm)
-    return own.rows_said(found, "; no picture" * nothing + doubt)
+    longest = out.largest_size(end for pair in limits for end in pair)
+    doubt = out.doubt_unit(unit, longest, arm)
+    return out.report_rows(found, "; no picture" * nothing + doubt)

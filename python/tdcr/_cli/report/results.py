@@ -7,28 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tdcr._cli.report.shape import (
-    as_json,
-    console_of,
-    contact_tables,
-    facts_table,
-    show,
-    table_of,
-    text_of,
-    vector_text,
-)
+from tdcr._cli.report.shape import contact_tables
+from tdcr._cli.report.tables import console_of, facts_table, show, table_of, text_of, vector_text
 from tdcr._core import _rotation_vector
-from tdcr._io.plain_data import described
 from tdcr._io.result_file import header_text
+from tdcr._io.save_load import json_text
 
 if TYPE_CHECKING:
     from tdcr._core import Robot
     from tdcr._inverse.results import Inverse, InverseBatch
     from tdcr._workspace.results import Workspace
     from tdcr.design import Prebend
-    from tdcr.design.fit import Fit
+    from tdcr.design.fitting import Fit, Part
     from tdcr.design.measurements import Measurements
-    from tdcr.design.routing import Routing
+    from tdcr.design.tendon_routing import Routing
 
 __all__ = [
     "design_json",
@@ -56,14 +48,14 @@ _UNITS = {
 _BASE = ("x [m]", "y [m]", "z [m]", "about x [rad]", "about y [rad]", "about z [rad]")
 
 
-def _scaled(unit: str) -> tuple[float, int]:
+def _scale_of(unit: str) -> tuple[float, int]:
     """Scale and digits of lengths in a unit."""
     return (1000.0, 3) if unit == "mm" else (1.0, 6)
 
 
 def _length(value: float, unit: str) -> str:
     """Format a length: small ones with three digits that count, rounding errors as such."""
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     if value < _NOTHING:
         return f"below {_NOTHING * scale:.0e}"
     value = value * scale
@@ -76,7 +68,7 @@ def _name(robot: Robot) -> tuple[str, str]:
 
 def _pulls(console: Any, robot: Robot, unit: str, displacements: Any, tensions: Any) -> Any:
     """Table of what each tendon does."""
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     known = bool(np.isfinite(tensions).any())
     spine = robot.backbone
     least = _NOTHING * np.abs(tensions).max(initial=0.0)
@@ -86,18 +78,19 @@ def _pulls(console: Any, robot: Robot, unit: str, displacements: Any, tensions: 
     for k, name in enumerate(robot.tendon_names):
         by = displacements[k]
         row = ["free" if math.isinf(by) else f"{by * scale:+.{digits}f}"]
-        table.add_row(text_of(name), *row, *([f"{_told(tensions[k], least):.6g}"] if known else []))
+        pulled = [f"{_clear_small(tensions[k], least):.6g}"] if known else []
+        table.add_row(text_of(name), *row, *pulled)
     return table
 
 
-def _told(value: float, least: float) -> float:
+def _clear_small(value: float, least: float) -> float:
     return 0.0 if abs(value) <= least else value
 
 
 def inverse_json(answer: Inverse) -> str:
     """Write an inverse as JSON that `Inverse.load` reads, with the shape for other readers."""
     shape = answer.shape
-    return as_json(
+    return json_text(
         answer,
         ok=answer.ok,
         units=shape.units,
@@ -111,13 +104,13 @@ def inverse_json(answer: Inverse) -> str:
 def track_json(found: InverseBatch) -> str:
     """Write a track as JSON that `InverseBatch.load` reads, with names for other readers."""
     units = found[0].shape.units
-    return as_json(found, units=units, tendon_names=list(found.robot.tendon_names))
+    return json_text(found, units=units, tendon_names=list(found.robot.tendon_names))
 
 
 def print_inverse(answer: Inverse, unit: str) -> None:
     """Print an inverse: how near it comes, and what each tendon does."""
     console = console_of()
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     frame = answer.target.ndim == 2
     place = answer.target[:3, 3] if frame else answer.target
     facts = [
@@ -141,7 +134,7 @@ def print_inverse(answer: Inverse, unit: str) -> None:
 def print_track(found: InverseBatch, unit: str) -> None:
     """Print how a path was followed, and where worst."""
     console = console_of()
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     pulls = found.displacements * scale
     restarted = int(np.count_nonzero(found.starts > 1))
     low, high = pulls.min(axis=0), pulls.max(axis=0)
@@ -198,7 +191,7 @@ def workspace_json(found: Workspace) -> str:
 def print_workspace(found: Workspace, unit: str) -> None:
     """Print reach and volume."""
     console = console_of()
-    scale, digits = _scaled(unit)
+    scale, digits = _scale_of(unit)
     facts = _workspace_facts(found)
     rows = [
         _name(found.robot),
@@ -222,28 +215,18 @@ def print_workspace(found: Workspace, unit: str) -> None:
     show(console, facts_table(console, *rows))
 
 
-def design_json(found: Any) -> str:
-    """Write a design as JSON."""
-    own = {
-        "ok": found.ok,
-        "units": found.shape.units,
-        "tendon_names": list(found.robot.tendon_names),
-        "frames": found.shape.frames,
-        "status": found.status,
-        "message": found.message,
-        "iterations": found.iterations,
-        "error": found.error,
-        "target_positions": found.target_positions,
-        "displacements": found.shape.displacements,
-        "positions": found.shape.positions,
-        "tensions": found.shape.tensions,
-        "robot": found.robot,
-    }
-    if hasattr(found, "holes"):
-        own |= {"holes": found.holes, "rms": found.rms, "relaxed_rms": found.relaxed_rms}
-        own["optimality"] = found.optimality
-    kind = type(found).__name__
-    return header_text(kind, {name: described(value, name) for name, value in own.items()})
+def design_json(found: Prebend | Routing) -> str:
+    """Write a design as JSON that its `load` reads, with more of its shape for other readers."""
+    return json_text(
+        found,
+        ok=found.ok,
+        units=found.shape.units,
+        tendon_names=list(found.robot.tendon_names),
+        frames=found.shape.frames,
+        displacements=found.shape.displacements,
+        positions=found.shape.positions,
+        tensions=found.shape.tensions,
+    )
 
 
 def print_design(found: Prebend | Routing, unit: str) -> None:
@@ -277,30 +260,18 @@ def print_design(found: Prebend | Routing, unit: str) -> None:
     show(console, *tables)
 
 
-def _parts(found: Fit) -> list[str]:
-    return ["train", *(["validation"] if found.validation.any() else [])]
+def _parts(found: Fit) -> list[Part]:
+    return ["train", "validation"] if found.validation.any() else ["train"]
 
 
 def fit_json(found: Fit, measured: Measurements) -> str:
-    """Write a fit as JSON."""
-    own: dict[str, Any] = {
-        "ok": found.ok,
-        "status": found.status,
-        "message": found.message,
-        "iterations": found.iterations,
-        "seed": found.seed,
-        "parameters": found.parameters,
-        "standard_errors": found.standard_errors,
-        "rows": found.rows,
-        "validation": found.validation,
-        "dropped": measured.dropped,
-        "failed": found.failed,
-        "robot": found.robot,
-    }
-    for part in _parts(found):
-        own[f"rms_{part}_before"] = found.rms(part, before=True)  # type: ignore[arg-type]
-        own[f"rms_{part}"] = found.rms(part)  # type: ignore[arg-type]
-    return header_text("Fit", {name: described(value, name) for name, value in own.items()})
+    """Write a fit as JSON that `Fit.load` reads, with distances for other readers.
+
+    Dropped rows are those of the file, which the reading of measurements has left out.
+    """
+    distances = {f"rms_{part}": found.rms(part) for part in _parts(found)}
+    distances |= {f"rms_{part}_before": found.rms(part, before=True) for part in _parts(found)}
+    return json_text(found, ok=found.ok, dropped=measured.dropped, **distances)
 
 
 def print_fit(found: Fit, measured: Measurements, unit: str) -> None:
@@ -318,7 +289,7 @@ def print_fit(found: Fit, measured: Measurements, unit: str) -> None:
     ]
     for part in _parts(found):
         name = "held-out rows" if part == "validation" else "fitted rows"
-        pair = (found.rms(part, before=b) for b in (True, False))  # type: ignore[arg-type]
+        pair = (found.rms(part, before=b) for b in (True, False))
         before, after = (_length(value, unit) for value in pair)
         facts.append((f"root mean square distance, {name} [{unit}]", f"{before} -> {after}"))
     # Columns are found by their order: a person sees whether it is that of the tendons.

@@ -1,15 +1,15 @@
-"""Shapes as JSON and as tables on a terminal, for the command line."""
+"""Shapes as tables on a terminal."""
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tdcr._cli.report.tables import console_of, facts_table, show, table_of, text_of, vector_text
 from tdcr._core import _rotation_vector
 
 if TYPE_CHECKING:
@@ -18,30 +18,7 @@ if TYPE_CHECKING:
 
     from tdcr._core import Shape
 
-__all__ = [
-    "as_json",
-    "console_of",
-    "contact_tables",
-    "facts_table",
-    "print_demo",
-    "print_shape",
-    "show",
-    "table_of",
-    "text_of",
-    "vector_text",
-]
-
-
-_WIDE = 10_000  # columns, more than any table has
-
-
-def as_json(result: Any, **more: Any) -> str:
-    """Write a result as JSON text: what its `save` writes into a .json file, and more fields."""
-    from tdcr._io.codecs import KINDS
-    from tdcr._io.result_file import header_text
-
-    kind = type(result).__name__
-    return header_text(kind, KINDS[kind].said(result) | more)
+__all__ = ["contact_tables", "print_demo", "print_shape"]
 
 
 def print_shape(shape: Shape, unit: str) -> None:
@@ -140,16 +117,6 @@ def print_demo(shapes: Sequence[Shape], times: Sequence[float]) -> None:
     show(console, table)
 
 
-def facts_table(console: Console, *facts: tuple[str, str]) -> Table:
-    """Make a table of names and what they are."""
-    table = table_of(console, "", "")
-    table.show_header = False
-    table.columns[1].justify = "left"
-    for name, text in facts:
-        table.add_row(text_of(name), text_of(text))
-    return table
-
-
 def _millimetres(shape: Shape) -> NDArray[np.float64]:
     """Position of the tip, rounded so that no -0.0 is left."""
     rounded: NDArray[np.float64] = (shape.tip[:3, 3] * 1000.0).round(1) + 0.0
@@ -159,66 +126,3 @@ def _millimetres(shape: Shape) -> NDArray[np.float64]:
 def _degrees(shape: Shape) -> NDArray[np.float64]:
     degrees: NDArray[np.float64] = np.degrees(_rotation_vector(shape.tip))
     return degrees
-
-
-def vector_text(values: NDArray[np.float64], digits: int) -> str:
-    # Adding 0.0 after rounding turns -0.0 into 0.0.
-    return "  ".join(f"{round(float(value), digits) + 0.0:.{digits}f}" for value in values)
-
-
-def text_of(text: str) -> Any:
-    """Text of a user's: square brackets in it are no markup."""
-    from rich.text import Text
-
-    return Text(text)
-
-
-def console_of() -> Console:
-    from rich.console import Console
-
-    class Told(Console):
-        """Console that leaves it to its caller that the reader has gone, rather than exit."""
-
-        def on_broken_pipe(self) -> None:
-            raise BrokenPipeError
-
-    # Into a pipe or a file: plain, and no line is broken to fit a terminal.
-    return Told(highlight=False) if sys.stdout.isatty() else Told(
-        highlight=False, width=400, no_color=True
-    )  # fmt: skip
-
-
-def show(console: Console, *tables: Table) -> None:
-    """Print tables with an empty line between them, whole.
-
-    A terminal that is too narrow breaks their lines: a number that lost its last digits would look
-    like another one.
-    """
-    for index, table in enumerate(tables):
-        if index:
-            console.print()
-        if console.is_terminal:
-            wide = console.options.update(max_width=_WIDE)
-            fixed = all(column.no_wrap for column in table.columns)
-            width = console.measure(table, options=wide).maximum if fixed else 0
-            console.width = max(width, console.width)
-            console.print(table)
-            continue
-        with console.capture() as captured:
-            console.print(table)
-        # Without the blanks that fill columns up.
-        lines = captured.get().rstrip("\n").split("\n")
-        console.file.write("".join(f"{line.rstrip()}\n" for line in lines))
-    console.file.flush()
-
-
-def table_of(console: Console, *headers: str) -> Table:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=box.SIMPLE_HEAD if console.is_terminal else None, pad_edge=False)
-    table.padding = (0, 1, 0, 0) if console.is_terminal else (0, 2, 0, 0)
-    for index, header in enumerate(headers):
-        table.add_column(Text(header), justify="left" if index == 0 else "right", no_wrap=True)
-    return table

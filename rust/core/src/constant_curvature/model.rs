@@ -7,7 +7,7 @@ use super::kinematics::tip_derivative;
 use super::plan::{Coupling, MaskedInverse, Plan};
 use crate::error::InvalidInput;
 use crate::lie::Pose;
-use crate::model::{Model, Report, State};
+use crate::model::{Model, Report, State, rod_only};
 use crate::robot::Robot;
 use crate::status::Status;
 
@@ -213,6 +213,8 @@ fn arc_fault(arcs: &[Arc]) -> Option<String> {
 }
 
 impl Model for ConstantCurvature<'_> {
+    const NAME: &'static str = "constant_curvature";
+
     type Scratch = Scratch;
 
     fn robot(&self) -> &Robot {
@@ -235,6 +237,18 @@ impl Model for ConstantCurvature<'_> {
                 .fold(0.0_f64, |largest, (off, path)| largest.max(off.abs() / path.rest_length))
         };
         Ok(Report { status, residual, iterations: 0 })
+    }
+
+    fn jacobian(
+        &self,
+        displacements: &[f64],
+        start: Option<&State>,
+        work: &mut Scratch,
+    ) -> Result<Result<Matrix6xX<f64>, Report>, InvalidInput> {
+        if start.is_some() {
+            return Err(rod_only("start", Self::NAME));
+        }
+        ConstantCurvature::jacobian(self, displacements, work).map(Ok)
     }
 
     fn state<'w>(&self, work: &'w Scratch) -> &'w State {

@@ -115,7 +115,7 @@ impl Segment {
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(super) segments: Vec<Segment>,
-    pub(super) settings: ConstantCurvatureSettings,
+    pub(crate) settings: ConstantCurvatureSettings,
     /// Mean radius of all tendons: the scale that makes bending and elongation comparable.
     pub(super) scale: f64,
     /// Displacements over unknowns, all tendons.

@@ -40,7 +40,7 @@ pub(super) fn mirror_tangent(tangent: &Vector3<f64>, chord: &Vector3<f64>) -> Ve
 /// # Errors
 /// `InvalidInput` for fewer than two points, points that are not finite or repeat.
 pub fn angle_at_base(robot: &Robot, points: &[Vector3<f64>]) -> Result<f64, InvalidInput> {
-    let along = Spline::checked(points)?.at_arc_length(0.0).1;
+    let along = Spline::through(points)?.at_arc_length(0.0).1;
     let axis = robot.base().rotation.column(2).into_owned();
     Ok(axis.cross(&along).norm().atan2(axis.dot(&along)))
 }
@@ -57,7 +57,7 @@ pub fn points_on_curve(
     points: &[Vector3<f64>],
     kind: Subsegment,
 ) -> Result<Vec<Vector3<f64>>, InvalidInput> {
-    let spline = Spline::checked(points)?;
+    let spline = Spline::through(points)?;
     let angle = angle_at_base(robot, points)?;
     // Then the first subsegment would have to bend by half a turn or more.
     if angle > FRAC_PI_2 * (1.0 - 1e-9) {

@@ -27,6 +27,27 @@ const ENOUGH: f64 = 1e-6;
 const REFINED: usize = 8;
 
 /// A designed robot.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::design::{PrebendSettings, prebend};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// // The disks on an arc of 1 rad without any pull.
+/// let targets: Vec<_> = (1..=10)
+///     .map(|i| 0.1 * f64::from(i))
+///     .map(|angle| Vector3::new(0.2 * (1.0 - angle.cos()), 0.0, 0.2 * angle.sin()))
+///     .collect();
+/// let found = prebend(&robot, &targets, &[f64::INFINITY; 3], &PrebendSettings::default())?;
+/// assert!(!found.robot.backbone().is_straight());
+/// assert!(found.errors.iter().all(|error| *error < 1e-3));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Prebend {
     /// The robot with its new rest shape.

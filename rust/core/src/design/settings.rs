@@ -4,6 +4,13 @@ use crate::error::InvalidInput;
 use crate::rod::RodSettings;
 
 /// Choices of a pre-bent design.
+///
+/// ```
+/// use tdcr::design::PrebendSettings;
+///
+/// let settings = PrebendSettings { max_bend: 0.5, ..PrebendSettings::default() };
+/// assert!(settings.validate().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrebendSettings {
     /// Settings of the rod model that the design is for.

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::lie::Pose;
 use crate::rod::Plan;
-use crate::rod::stepwise_inverse::March;
+use crate::rod::stepwise_inverse::StepwiseInverse;
 
 /// Newton steps at most, and when lengths are met, in shares of them.
 const STEPS: usize = 50;
@@ -12,13 +12,13 @@ const MET: f64 = 1e-14;
 
 /// The rest shape whose march through `targets` has the tendons at their displacements.
 pub(super) struct Answer {
-    pub(super) march: March,
+    pub(super) march: StepwiseInverse,
     /// In the plan's unit.
     pub(super) tensions: Vec<f64>,
     pub(super) iterations: usize,
 }
 
-/// Marches with the tensions that the displacements ask for; none when it finds none. Tendons that would
+/// StepwiseInversees with the tensions that the displacements ask for; none when it finds none. Tendons that would
 /// have to push are slack.
 pub(super) fn solve_tensions(
     plan: &Plan,
@@ -29,7 +29,8 @@ pub(super) fn solve_tensions(
 ) -> Option<Answer> {
     let count = displacements.len();
     let mut taut: Vec<usize> = (0..count).filter(|k| displacements[*k] < 0.0).collect();
-    let mut answer = Answer { march: March::default(), tensions: vec![0.0; count], iterations: 0 };
+    let mut answer =
+        Answer { march: StepwiseInverse::default(), tensions: vec![0.0; count], iterations: 0 };
     for _ in 0..2 * count + 2 {
         meet_displacements(plan, base, targets, twists, displacements, &taut, &mut answer)?;
         let pushing = taut.iter().copied().find(|k| answer.tensions[*k] < 0.0);
@@ -39,7 +40,7 @@ pub(super) fn solve_tensions(
             continue;
         }
         let long = (0..count).find(|k| {
-            let over = answer.march.stretch[*k] - displacements[*k];
+            let over = answer.march.elongations[*k] - displacements[*k];
             !taut.contains(k) && over > 1e-12 * plan.total_length()
         });
         let Some(long) = long else { return Some(answer) };
@@ -60,16 +61,17 @@ fn meet_displacements(
 ) -> Option<()> {
     // Excess Σ L(ω) − Σ L(ω_rest) − C T − displacement of every taut tendon.
     let length = plan.total_length();
-    let excess = |march: &March, tensions: &[f64]| {
+    let excess = |march: &StepwiseInverse, tensions: &[f64]| {
         DVector::from_iterator(
             taut.len(),
-            taut.iter()
-                .map(|&k| march.stretch[k] - displacements[k] - plan.compliance[k] * tensions[k]),
+            taut.iter().map(|&k| {
+                march.elongations[k] - displacements[k] - plan.compliance[k] * tensions[k]
+            }),
         )
     };
     let invert = |answer: &mut Answer, tensions: &[f64]| {
         answer.iterations += 1;
-        answer.march.go(plan, base, targets, twists, tensions)
+        answer.march.solve(plan, base, targets, twists, tensions)
     };
     // From the tensions at hand.
     let start = answer.tensions.clone();

@@ -188,11 +188,13 @@ pub fn invert_rows<I: Inverter>(
     let count = inverse.robot().tendons().len();
     let mut rows = InverseRows::blank(targets.len(), count);
     let InverseRows { displacements, tensions, answers } = &mut rows;
+    // One start for all targets, or one per target.
     let width = (ROWS_PER_JOB * count).max(1);
     let begin = |own: &[f64]| inverse.start(own, Some(&control.stop));
     pool.install(|| {
         let all =
             (!starts.is_empty() && starts.len() == count).then(|| begin(starts)).transpose()?;
+        // Jobs of a few rows, with one set of buffers per thread.
         (targets.par_chunks(ROWS_PER_JOB))
             .zip(answers.par_chunks_mut(ROWS_PER_JOB))
             .zip(displacements.par_chunks_mut(width))
@@ -205,9 +207,11 @@ pub fn invert_rows<I: Inverter>(
                         if control.stop.load(Ordering::Relaxed) {
                             return Ok(());
                         }
+                        // The row's start and its solve, as if it were alone.
                         let each = starts.chunks_exact(count.max(1)).nth(ROWS_PER_JOB * job + i);
                         let each = each.filter(|_| all.is_none()).map(begin).transpose()?;
                         *answer = inverse.solve(target, each.as_ref().or(all.as_ref()), work);
+                        // Its displacements and tensions.
                         let own = i * count..(i + 1) * count;
                         inverse.write_displacements(work, &mut displacements[own.clone()]);
                         inverse.write_tensions(work, &mut tensions[own]);

@@ -232,6 +232,8 @@ impl<'r> Linkage<'r> {
 }
 
 impl Model for Linkage<'_> {
+    const NAME: &'static str = "linkage";
+
     type Scratch = Scratch;
 
     fn robot(&self) -> &Robot {

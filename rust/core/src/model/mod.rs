@@ -4,6 +4,8 @@ mod contact;
 mod shape;
 mod state;
 
+use nalgebra::Matrix6xX;
+
 use crate::error::InvalidInput;
 use crate::robot::Robot;
 
@@ -36,6 +38,9 @@ pub use state::{Report, State};
 /// # }
 /// ```
 pub trait Model: Sync {
+    /// Name used in Python and in messages.
+    const NAME: &'static str;
+
     /// Buffers of a solve.
     type Scratch: Default + Send;
 
@@ -76,6 +81,51 @@ pub trait Model: Sync {
         self.solve(displacements, work)
     }
 
+    /// Solves for displacements from an earlier shape of the same robot; a start that does not help is dropped.
+    ///
+    /// # Errors
+    /// `InvalidInput` by default: a model without forces has nothing to start from.
+    fn solve_from(
+        &self,
+        _start: &State,
+        _displacements: &[f64],
+        _work: &mut Self::Scratch,
+    ) -> Result<Report, InvalidInput> {
+        Err(rod_only("start", Self::NAME))
+    }
+
+    /// Solves for tensions, in the unit of the results.
+    ///
+    /// # Errors
+    /// `InvalidInput` by default: a model without forces does not take tensions.
+    fn solve_tensions(
+        &self,
+        _tensions: &[f64],
+        _work: &mut Self::Scratch,
+    ) -> Result<Report, InvalidInput> {
+        Err(rod_only("tensions", Self::NAME))
+    }
+
+    /// Displacements that lead to a state \[m\].
+    fn displacements(&self, state: &State) -> Vec<f64> {
+        let lengths = state.tendon_lengths.iter().zip(self.robot().paths());
+        lengths.map(|(length, path)| length - path.rest_length).collect()
+    }
+
+    /// Velocity of the tool point, then angular velocity, by displacements (6 x K, world axes), solved from rest
+    /// or from an earlier shape; the report of a solve that did not converge instead.
+    ///
+    /// # Errors
+    /// `InvalidInput` by default: a model without derivatives has none.
+    fn jacobian(
+        &self,
+        _displacements: &[f64],
+        _start: Option<&State>,
+        _work: &mut Self::Scratch,
+    ) -> Result<Result<Matrix6xX<f64>, Report>, InvalidInput> {
+        Err(no_derivatives(Self::NAME))
+    }
+
     /// The solved quantities of the last solve in `work`.
     fn state<'w>(&self, work: &'w Self::Scratch) -> &'w State;
 
@@ -101,4 +151,21 @@ pub trait Model: Sync {
         let message = self.message(displacements, &work);
         Shape { state: self.take_state(work), report, message }
     }
+}
+
+/// Error for an argument that models without forces do not take.
+#[must_use]
+pub fn rod_only(argument: &str, model: &str) -> InvalidInput {
+    InvalidInput::new(
+        argument,
+        "none, or model \"rod\"",
+        format!("{argument} for model \"{model}\""),
+    )
+}
+
+/// Error for the Jacobian of a model that has none.
+#[must_use]
+pub fn no_derivatives(model: &str) -> InvalidInput {
+    let expected = "a model with derivatives (\"rod\" or \"constant_curvature\")";
+    InvalidInput::new("model", expected, format!("\"{model}\""))
 }

@@ -6,6 +6,7 @@
 //! `docs/obstacles.md`.
 
 mod cuboid;
+mod first_fault;
 mod mesh;
 mod signed_distance;
 mod smooth;
@@ -13,6 +14,7 @@ mod smooth;
 use nalgebra::{Matrix3, Vector3};
 
 pub use cuboid::Cuboid;
+pub use first_fault::FirstFault;
 pub use mesh::Mesh;
 pub use signed_distance::{DistanceFunction, Fault, SignedDistance, by_differences};
 pub use smooth::{Capsule, Cylinder, HalfSpace, Sphere};

@@ -35,7 +35,7 @@ pub(super) fn rest_from_curve(
     if subsegments == 0 {
         return Err(InvalidInput::new("subsegments", "at least 1", 0));
     }
-    let spline = Spline::checked(points)?;
+    let spline = Spline::through(points)?;
     let length = spline.length();
     let steps = subsegments * TRANSPORT_STEPS;
     let mut place = spline.at_arc_length(0.0);
@@ -100,7 +100,7 @@ pub(crate) struct Spline<'p> {
 
 impl<'p> Spline<'p> {
     /// Through points that are finite and do not repeat, at least two.
-    pub(crate) fn checked(points: &'p [Vector3<f64>]) -> Result<Self, InvalidInput> {
+    pub(crate) fn through(points: &'p [Vector3<f64>]) -> Result<Self, InvalidInput> {
         if points.len() < 2 {
             return Err(InvalidInput::new("points", "at least 2 points", points.len()));
         }

@@ -2,12 +2,17 @@
 
 mod backbone;
 mod curve;
+mod derived;
 mod tendon;
+
+use std::any::Any;
+use std::sync::Arc;
 
 use nalgebra::{Matrix4, Vector3};
 
 pub use backbone::{Backbone, BackboneSpec};
 pub(crate) use curve::Spline;
+use derived::Derived;
 pub use tendon::{PerDisk, Routing, Tendon};
 
 use crate::error::{self, InvalidInput};
@@ -88,6 +93,7 @@ pub struct Robot {
     name: Option<String>,
     tendon_names: Vec<String>,
     paths: Vec<Path>,
+    derived: Derived,
 }
 
 impl Robot {
@@ -117,7 +123,8 @@ impl Robot {
                 resolve(tendon, &backbone, &rest).map_err(|e| e.within(&format!("tendons[{k}]")))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { backbone, tendons, base, tool, name, tendon_names, paths })
+        let derived = Derived::default();
+        Ok(Self { backbone, tendons, base, tool, name, tendon_names, paths, derived })
     }
 
     /// Copy of the robot with another backbone.
@@ -178,6 +185,11 @@ impl Robot {
     #[must_use]
     pub fn name(&self) -> Option<&str> {
         self.name.as_deref()
+    }
+
+    /// Value that a higher room derives from this robot, made from its default on first use and kept with it.
+    pub(crate) fn derived<T: Any + Default + Send + Sync>(&self) -> Arc<T> {
+        self.derived.get()
     }
 
     /// Disk frames at rest, in the world; subsegments are arcs of constant strain.

@@ -1,23 +1,23 @@
-//! From any start to the displacements: Newton's method on the dual.
+//! Newton's method on the dual: from any start to the displacements.
 //!
 //! With the subsegments at their minima for given tensions, the minimum of energy and tensions' work is a
-//! concave function of the tensions whose slope is what the tendons are too long. Its Newton step is the one of
-//! the whole system. A step that goes past the top of its line is shortened, and so is one after which a
-//! subsegment is no longer at a minimum: rest leads to the answer without jumps, or the way ends.
+//! concave function D(T) of the tensions whose gradient is what the tendons are too long. Its Newton step is the one
+//! of the whole system. A step past the maximum along its line is shortened, and so is one after which a subsegment
+//! is no longer at a minimum: rest leads to the answer without jumps, or the path ends.
 
-use super::newton_system::{Chain, JUMP, Left, RIDGE};
+use super::newton_system::{JUMP, NewtonSystem, RIDGE, Residual};
 use super::plan::Plan;
 
-/// How far off balance subsegments may be where the way is easy, and where it is not.
-pub(super) const EASY: f64 = 0.3;
-const HARD: f64 = 1e-9;
-/// A way is not easy if it takes more steps, or if one had to be shortened.
-const EASY_STEPS: usize = 12;
-/// Evaluations that one way may take.
-const WAY: usize = 70;
-/// Share of what the rod itself gives, which soft tendons begin with, below which they are rigid; from there to
-/// here they go by factors from the first towards the last, which is too near 1 to go on.
+/// Balance of the subsegments while steps go well \[rad of their own stiffness\], and from the first bad one on.
+pub(super) const LOOSE_BALANCE: f64 = 0.3;
+const TIGHT_BALANCE: f64 = 1e-9;
+/// Newton steps in loose balance at most.
+const LOOSE_STEPS: usize = 12;
+/// Evaluations of one path at most.
+const PATH_EVALUATIONS: usize = 70;
+/// Added compliance that counts as none, as a share of the rod's own.
 const RIGID: f64 = 1e-7;
+/// Factor by which the added compliance falls: the first one, and the one that is too near 1 to go on.
 const FACTOR: (f64, f64) = (0.1, 0.7);
 /// No strain moves further in one step \[rad\].
 const STEP: f64 = 0.5;
@@ -25,20 +25,20 @@ const STEP: f64 = 0.5;
 const LOAD: f64 = 6.0;
 /// Ridges that are tried while the step of dependent tendons is too long.
 const RIDGES: [f64; 6] = [1e-11, 1e-9, 1e-7, 1e-5, 1e-3, 1e-2];
-/// A slope that turns by more than this share of itself has gone past the top.
+/// Slope of the dual at the end of a step, as a share of minus that at its start, beyond which it is shortened.
 const TURNED: f64 = 0.5;
 /// Steps are not made shorter.
 const SHORTEST: f64 = 1e-6;
-/// Subsegments that take no more load than this are at the end of their way.
+/// Subsegments that bear no more load than this are at the end of their path.
 const MARGIN: f64 = 0.02;
 
-/// How an ascent ended.
+/// End of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Ending {
     /// At the minimum.
     #[default]
     Converged,
-    /// Where no longer step keeps every subsegment at a minimum.
+    /// No longer step keeps every subsegment at a minimum.
     Lost,
     /// Out of evaluations.
     Spent,
@@ -56,198 +56,229 @@ struct Point {
 }
 
 impl Point {
-    fn keep(&mut self, chain: &Chain) {
-        self.strains.clone_from(&chain.strains);
-        self.tensions.clone_from(&chain.tensions);
+    fn save(&mut self, system: &NewtonSystem) {
+        self.strains.clone_from(&system.strains);
+        self.tensions.clone_from(&system.tensions);
     }
 
-    fn restore(&self, chain: &mut Chain) {
-        chain.strains.clone_from(&self.strains);
-        chain.tensions.clone_from(&self.tensions);
+    fn restore(&self, system: &mut NewtonSystem) {
+        system.strains.clone_from(&self.strains);
+        system.tensions.clone_from(&self.tensions);
     }
 }
 
-/// Buffers of an ascent.
+/// Buffers of Newton's method on the dual.
 #[derive(Clone, Debug, Default)]
 pub(super) struct DualNewton {
-    /// Where the way began, and the last point on it with tendons of some softness.
+    /// Start of the path, and the last point that was solved with added compliance.
     start: Point,
-    reached: Point,
-    /// The point that the last good step led to, and the step from it.
-    kept: Point,
-    pulls: Vec<f64>,
-    step: Vec<f64>,
+    solved: Point,
+    /// Point from which the last step was taken, and that step.
+    accepted: Point,
+    tension_step: Vec<f64>,
+    strain_step: Vec<f64>,
 }
 
-/// The step that is being taken.
+/// Step that is being tried.
 #[derive(Clone, Copy)]
-struct Stride {
+struct Step {
     share: f64,
     /// Slope of the dual along the step, at its start.
     slope: f64,
 }
 
-/// How a way is followed.
-struct Way {
-    /// How far off balance subsegments may be.
+/// Progress along one path.
+struct Path {
+    /// Balance of the subsegments.
     balance: f64,
     steps: usize,
-    /// It is the second try, from the start and in balance all along.
+    /// It is the second try, from the start and in tight balance all along.
     again: bool,
-    stride: Option<Stride>,
+    step: Option<Step>,
 }
 
 impl DualNewton {
-    /// Goes from the chain's strains and tensions to its bounds within a number of evaluations, which is
+    /// Solves from the strains and tensions of a system to its bounds within a number of evaluations, which is
     /// counted down: at once if that works, else by tendons that are soft at first. Soft tendons leave no
     /// displacements infeasible, and become rigid along a path without jumps.
-    pub(super) fn climb(
+    pub(super) fn solve(
         &mut self,
         plan: &Plan,
-        chain: &mut Chain,
+        system: &mut NewtonSystem,
         budget: &mut usize,
-    ) -> (Ending, Left) {
-        self.start.keep(chain);
-        chain.give = 0.0;
-        let (ending, left) = self.within(plan, chain, budget);
+    ) -> (Ending, Residual) {
+        // At once, with the tendons' own compliance C.
+        self.start.save(system);
+        system.added_compliance = 0.0;
+        let (ending, residual) = self.solve_path(plan, system, budget);
         if ending == Ending::Converged || *budget == 0 {
-            return (ending, left);
+            return (ending, residual);
         }
-        self.start.restore(chain);
-        chain.assemble(plan, EASY);
-        let scale = chain.softness();
+        // C grows by the largest diagonal entry of S at the start.
+        self.start.restore(system);
+        system.assemble(plan, LOOSE_BALANCE);
+        let scale = system.largest_compliance();
         let (mut factor, mut next) = (FACTOR.0, scale);
-        let mut soft = f64::INFINITY;
+        let mut compliance = f64::INFINITY;
+        // It falls to nothing: by a smaller factor after a success, by one nearer to 1 after a failure.
         loop {
-            chain.give = if next < RIGID * scale { 0.0 } else { next };
-            self.start.keep(chain);
-            let (ending, left) = self.within(plan, chain, budget);
+            system.added_compliance = if next < RIGID * scale { 0.0 } else { next };
+            self.start.save(system);
+            let (ending, residual) = self.solve_path(plan, system, budget);
             if ending == Ending::Converged {
-                if chain.give == 0.0 {
-                    return (ending, left);
+                if system.added_compliance == 0.0 {
+                    return (ending, residual);
                 }
-                soft = next;
+                // On to a stiffer one.
+                compliance = next;
                 factor = (factor * factor).max(FACTOR.0 * FACTOR.0);
-                self.reached.keep(chain);
+                self.solved.save(system);
             } else {
                 factor = factor.sqrt();
-                if *budget == 0 || factor > FACTOR.1 || soft.is_infinite() {
-                    return self.give_up(plan, chain, *budget, soft.is_finite());
+                if *budget == 0 || factor > FACTOR.1 || compliance.is_infinite() {
+                    return self.give_up(plan, system, *budget, compliance.is_finite());
                 }
-                self.reached.restore(chain);
+                self.solved.restore(system);
             }
-            next = soft * factor;
+            next = compliance * factor;
         }
     }
 
-    /// Leaves the last point that was reached, and what is left there.
+    /// Leaves the last point that was solved, and the residual there.
     fn give_up(
         &self,
         plan: &Plan,
-        chain: &mut Chain,
+        system: &mut NewtonSystem,
         budget: usize,
-        reached: bool,
-    ) -> (Ending, Left) {
-        if reached {
-            self.reached.restore(chain);
+        solved: bool,
+    ) -> (Ending, Residual) {
+        if solved {
+            self.solved.restore(system);
         }
-        chain.give = 0.0;
-        let left = chain.assemble(plan, EASY);
+        system.added_compliance = 0.0;
+        let residual = system.assemble(plan, LOOSE_BALANCE);
         let ending = if budget == 0 { Ending::Spent } else { Ending::Lost };
-        (if left.worst().is_finite() { ending } else { Ending::Broken }, left)
+        (if residual.worst().is_finite() { ending } else { Ending::Broken }, residual)
     }
 
-    /// One way, with its share of the budget.
-    fn within(&mut self, plan: &Plan, chain: &mut Chain, budget: &mut usize) -> (Ending, Left) {
-        let mut share = (*budget).min(WAY);
+    /// One path, with its share of the budget.
+    fn solve_path(
+        &mut self,
+        plan: &Plan,
+        system: &mut NewtonSystem,
+        budget: &mut usize,
+    ) -> (Ending, Residual) {
+        let mut share = (*budget).min(PATH_EVALUATIONS);
         *budget -= share;
-        let outcome = self.follow(plan, chain, &mut share);
+        let outcome = self.follow_path(plan, system, &mut share);
         *budget += share;
         outcome
     }
 
-    fn follow(&mut self, plan: &Plan, chain: &mut Chain, budget: &mut usize) -> (Ending, Left) {
-        let mut way = Way { balance: EASY, steps: 0, again: false, stride: None };
+    fn follow_path(
+        &mut self,
+        plan: &Plan,
+        system: &mut NewtonSystem,
+        budget: &mut usize,
+    ) -> (Ending, Residual) {
+        let mut path = Path { balance: LOOSE_BALANCE, steps: 0, again: false, step: None };
         loop {
-            if way.balance == HARD && way.stride.is_some() {
-                chain.choose(plan, &self.kept.strains);
+            if path.balance == TIGHT_BALANCE && path.step.is_some() {
+                system.keep_lower_energy(plan, &self.accepted.strains);
             }
-            let left = chain.assemble(plan, way.balance);
-            *budget = budget.saturating_sub(left.rounds);
-            if left.worst() <= plan.settings.tolerance && left.stable {
-                return (Ending::Converged, left);
+            let residual = system.assemble(plan, path.balance);
+            *budget = budget.saturating_sub(residual.evaluations);
+            if residual.worst() <= plan.settings.tolerance && residual.stable {
+                return (Ending::Converged, residual);
             }
             if *budget == 0 {
-                return (Ending::Spent, left);
+                return (Ending::Spent, residual);
             }
-            match self.judge(plan, &mut way, &left, chain) {
+            match self.judge(plan, &mut path, &residual, system) {
                 Verdict::Good => {}
                 Verdict::Retry => continue,
-                Verdict::Lost => return (Ending::Lost, left),
+                Verdict::Lost => return (Ending::Lost, residual),
             }
-            if !direction(plan, chain) {
-                return (Ending::Broken, left);
+            // Length of a step: bounds on what strains and loads change by.
+            if !newton_step(plan, system) {
+                return (Ending::Broken, residual);
             }
-            way.steps += 1;
-            let share = 1.0_f64.min(STEP / chain.longest()).min(LOAD / loads(plan, &chain.pulls));
-            way.stride = Some(Stride { share, slope: chain.growth(&chain.pulls) });
-            self.kept.keep(chain);
-            self.pulls.clone_from(&chain.pulls);
-            self.step.clone_from(&chain.step);
-            self.put(plan, chain, share);
+            path.steps += 1;
+            let share = 1.0_f64
+                .min(STEP / system.longest_strain_step())
+                .min(LOAD / load(plan, &system.tension_step));
+            path.step = Some(Step { share, slope: system.dual_slope(&system.tension_step) });
+            self.accepted.save(system);
+            self.tension_step.clone_from(&system.tension_step);
+            self.strain_step.clone_from(&system.strain_step);
+            self.move_to(plan, system, share);
         }
     }
 
-    /// Whether the point that was assembled is one to go on from; if not, the chain is put at another.
-    fn judge(&self, plan: &Plan, way: &mut Way, left: &Left, chain: &mut Chain) -> Verdict {
-        let balanced = way.balance == EASY || left.moment <= way.balance;
-        let sound = left.worst().is_finite() && left.stable && left.moved < JUMP && balanced;
-        let Some(stride) = way.stride else {
+    /// Judges the point that was assembled: good to go on from, or the system is put at another.
+    fn judge(
+        &self,
+        plan: &Plan,
+        path: &mut Path,
+        residual: &Residual,
+        system: &mut NewtonSystem,
+    ) -> Verdict {
+        // Every H_i positive definite, no jump, and balanced as asked.
+        let balanced = path.balance == LOOSE_BALANCE || residual.moment <= path.balance;
+        let sound =
+            residual.worst().is_finite() && residual.stable && residual.moved < JUMP && balanced;
+        // A start has no step to shorten: once more in tight balance.
+        let Some(step) = path.step else {
             if sound {
                 return Verdict::Good;
             }
-            if way.again {
+            if path.again {
                 return Verdict::Lost;
             }
-            way.again = true;
-            way.balance = HARD;
-            self.start.restore(chain);
+            path.again = true;
+            path.balance = TIGHT_BALANCE;
+            self.start.restore(system);
             return Verdict::Retry;
         };
-        let slope = chain.growth(&self.pulls);
+        // Shares of the step: a quarter, or the secant rule where the slope has turned past the maximum.
+        let slope = system.dual_slope(&self.tension_step);
         let share = if !sound {
-            0.25 * stride.share
-        } else if slope < -TURNED * stride.slope {
-            stride.share * (stride.slope / (stride.slope - slope)).clamp(0.1, 0.7)
-        } else if way.balance == HARD || way.steps <= EASY_STEPS {
+            0.25 * step.share
+        } else if slope < -TURNED * step.slope {
+            step.share * (step.slope / (step.slope - slope)).clamp(0.1, 0.7)
+        } else if path.balance == TIGHT_BALANCE || path.steps <= LOOSE_STEPS {
             return Verdict::Good;
         } else {
-            0.5 * stride.share
+            0.5 * step.share
         };
-        let crowded = !sound && share * loads(plan, &self.pulls) < MARGIN;
-        if share < SHORTEST || crowded {
+        let at_end = !sound && share * load(plan, &self.tension_step) < MARGIN;
+        if share < SHORTEST || at_end {
             return Verdict::Lost;
         }
-        if way.balance == EASY {
+        if path.balance == LOOSE_BALANCE {
             // The slopes were those of a point off balance: once more from there.
-            way.balance = HARD;
-            way.stride = None;
-            self.put(plan, chain, 0.0);
+            path.balance = TIGHT_BALANCE;
+            path.step = None;
+            self.move_to(plan, system, 0.0);
         } else {
-            way.stride = Some(Stride { share, ..stride });
-            self.put(plan, chain, share);
+            path.step = Some(Step { share, ..step });
+            self.move_to(plan, system, share);
         }
         Verdict::Retry
     }
 
-    /// Puts the chain at a share of the step.
-    fn put(&self, plan: &Plan, chain: &mut Chain, share: f64) {
-        let kept = &self.kept;
-        for ((own, kept), step) in chain.strains.iter_mut().zip(&kept.strains).zip(&self.step) {
-            *own = kept + share * step;
+    /// Moves the system to a share of the step.
+    fn move_to(&self, plan: &Plan, system: &mut NewtonSystem, share: f64) {
+        let from = &self.accepted;
+        for ((own, from), step) in
+            system.strains.iter_mut().zip(&from.strains).zip(&self.strain_step)
+        {
+            *own = from + share * step;
         }
-        for ((own, kept), pull) in chain.tensions.iter_mut().zip(&kept.tensions).zip(&self.pulls) {
-            let tension = kept + share * pull;
+        for ((own, from), step) in
+            system.tensions.iter_mut().zip(&from.tensions).zip(&self.tension_step)
+        {
+            let tension = from + share * step;
             // Rounding leaves no tension below zero.
             *own = if plan.signed { tension } else { tension.max(0.0) };
         }
@@ -260,20 +291,21 @@ enum Verdict {
     Lost,
 }
 
-/// What changes of the tensions add to the load of the slenderest subsegment, at most.
-fn loads(plan: &Plan, pulls: &[f64]) -> f64 {
-    pulls.iter().map(|pull| pull.abs()).sum::<f64>() * plan.slenderness
+/// Load that changes of the tensions add to the slenderest subsegment, at most: `Σ |dT| ℓ²/EI`.
+fn load(plan: &Plan, tension_step: &[f64]) -> f64 {
+    tension_step.iter().map(|step| step.abs()).sum::<f64>() * plan.slenderness
 }
 
 /// The Newton step, with as little ridge as keeps dependent tendons from running away, and rounding from
 /// turning it downwards.
-fn direction(plan: &Plan, chain: &mut Chain) -> bool {
-    let mut solved = chain.solve(plan, RIDGE);
+fn newton_step(plan: &Plan, system: &mut NewtonSystem) -> bool {
+    let mut solved = system.solve(plan, RIDGE);
     for ridge in RIDGES {
-        if solved && loads(plan, &chain.pulls) <= LOAD && chain.growth(&chain.pulls) > 0.0 {
+        let step = &system.tension_step;
+        if solved && load(plan, step) <= LOAD && system.dual_slope(step) > 0.0 {
             break;
         }
-        solved = chain.solve(plan, ridge);
+        solved = system.solve(plan, ridge);
     }
     solved
 }

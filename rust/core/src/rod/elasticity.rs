@@ -17,9 +17,9 @@ pub(super) struct Elasticity {
 /// Relative changes of what the stiffness of an element is made of, at constant EI and EA, or a gradient by them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct StiffnessChange {
-    /// Of the element's length.
+    /// Relative change of the element's length.
     pub(super) length: f64,
-    /// Of 1 + ν.
+    /// Relative change of 1 + ν.
     pub(super) shear: f64,
 }
 

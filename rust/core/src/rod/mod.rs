@@ -6,6 +6,7 @@ mod dual_newton;
 mod elasticity;
 pub(crate) mod element;
 pub(crate) mod equilibrium;
+mod load_stepping;
 mod message;
 mod model;
 mod newton_system;

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix6xX, Vector3};
 
 use super::degenerate_rest;
-use super::dual_newton::{DualNewton, EASY, Ending};
-use super::message::message;
-use super::newton_system::{Chain, JUMP, Left};
+use super::dual_newton::{DualNewton, Ending};
+use super::load_stepping::{Limits, LoadStepping};
+use super::message::{Failure, message};
+use super::newton_system::{NewtonSystem, Residual};
 use super::plan::Plan;
 use super::tendon_law::Equations;
 use crate::error::InvalidInput;
@@ -18,23 +19,62 @@ use crate::robot::Robot;
 use crate::status::Status;
 
 /// Buffers of a solve.
+///
+/// ```
+/// use tdcr::model::Model;
+/// use tdcr::rod::{Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let rod = Rod::new(&robot, &plan);
+/// // The same buffers for many solves.
+/// let mut scratch = Scratch::default();
+/// for pull in [0.001, 0.002, 0.003] {
+///     let report = rod.solve(&[-pull, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+///     assert_eq!(report.status, tdcr::Status::Converged);
+/// }
+/// assert!(rod.state(&scratch).tensions[0] > 0.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     pub(super) state: State,
-    pub(super) chain: Chain,
+    pub(super) system: NewtonSystem,
     /// One subsegment, where displacements are proportional.
-    pub(super) part: Chain,
-    /// Tension of every piece, and the tendons that drive.
-    pub(super) pulls: Vec<f64>,
+    pub(super) part: NewtonSystem,
+    /// Tension of every piece, and the tendons that drive, where displacements are proportional.
+    pub(super) piece_tensions: Vec<f64>,
     pub(super) drives: Vec<bool>,
-    pub(super) ascent: DualNewton,
-    pub(super) left: Left,
+    pub(super) dual_newton: DualNewton,
+    pub(super) residual: Residual,
     pub(super) ending: Ending,
-    /// Strains at the last load that was reached, where tensions are given.
-    reached: Vec<f64>,
+    load_stepping: LoadStepping,
 }
 
 /// The rod model of a robot, ready to solve.
+///
+/// ```
+/// use tdcr::model::Model;
+/// use tdcr::rod::{Plan, Rod, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// // One tendon is pulled, the others are free.
+/// let shape = Rod::new(&robot, &plan).shape(&[-0.005, f64::INFINITY, f64::INFINITY])?;
+/// assert_eq!(shape.report.status, tdcr::Status::Converged);
+/// assert!(shape.state.tensions.iter().all(|tension| *tension >= 0.0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Rod<'r> {
     pub(super) robot: &'r Robot,
@@ -42,9 +82,8 @@ pub struct Rod<'r> {
     pub(super) stop: Option<Arc<AtomicBool>>,
 }
 
-/// Newton steps per load step, where tensions are given.
-const PATIENCE: usize = 20;
-/// Load steps are not made shorter.
+/// Newton steps per load step, where tensions are given, and the shortest load step.
+const NEWTON_STEPS: usize = 20;
 const SHORTEST: f64 = 1e-4;
 
 impl<'r> Rod<'r> {
@@ -54,7 +93,7 @@ impl<'r> Rod<'r> {
         Self { robot, plan, stop: None }
     }
 
-    /// The same, whose solves end soon after the flag is set, with the status of an iteration limit. It is
+    /// Rod whose solves end soon after the flag is set, with the status of an iteration limit. It is
     /// looked at once per subsegment.
     #[must_use]
     pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
@@ -62,8 +101,8 @@ impl<'r> Rod<'r> {
     }
 
     /// Hands the flag to the solve that begins.
-    fn listen(&self, work: &mut Scratch) {
-        work.chain.stop.clone_from(&self.stop);
+    fn share_stop(&self, work: &mut Scratch) {
+        work.system.stop.clone_from(&self.stop);
         work.part.stop.clone_from(&self.stop);
     }
 
@@ -73,119 +112,17 @@ impl<'r> Rod<'r> {
         &self.plan.rest_lengths
     }
 
-    /// Displacements under which a shape has the lengths and tensions that it has: what its tendons are
-    /// longer than at rest, without what tension stretches them \[m\].
-    #[must_use]
-    pub fn displacements(&self, state: &State) -> Vec<f64> {
+    /// Solves from the strains and tensions at hand to the displacements; returns the number of evaluations.
+    fn solve_displacements(&self, displacements: &[f64], work: &mut Scratch) -> usize {
         let plan = self.plan;
-        let rows = state.tendon_lengths.iter().zip(&state.tensions);
-        let plans = plan.rest_lengths.iter().zip(&plan.compliance);
-        let change = |((own, tension), (rest, give)): ((&f64, &f64), (&f64, &f64))| {
-            own - give * tension / plan.unit - rest
-        };
-        rows.zip(plans).map(change).collect()
-    }
-
-    /// The shape under given tensions, in the unit of the results: displacements are then what it has. A
-    /// minimum that rest leads to as the tensions grow together; infeasible beyond where it ends.
-    ///
-    /// # Errors
-    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
-    pub fn solve_tensions(
-        &self,
-        tensions: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        let expected = "sliding tendons where tensions are given";
-        self.plan.settings.tendons.require_tensions("tendons", expected)?;
-        self.plan.check_tensions(tensions)?;
-        let mut budget = self.plan.settings.max_iterations;
-        self.listen(work);
-        let chain = &mut work.chain;
-        chain.rest(self.plan);
-        chain.unbound(self.plan);
-        chain.taut.clear();
-        chain.taut.extend(tensions.iter().map(|tension| *tension > 0.0));
-        work.reached.clone_from(&chain.strains);
-        let (mut load, mut stride) = (0.0, 1.0_f64);
-        work.ending = Ending::Converged;
-        while load < 1.0 {
-            let next = (load + stride).min(1.0);
-            for (own, wanted) in work.chain.tensions.iter_mut().zip(tensions) {
-                *own = next * wanted / self.plan.unit;
-            }
-            if self.settle(work, &mut budget) {
-                load = next;
-                stride *= 2.0;
-                work.reached.clone_from(&work.chain.strains);
-            } else {
-                work.chain.strains.clone_from(&work.reached);
-                stride = 0.5 * (next - load);
-                if budget == 0 || stride < SHORTEST {
-                    for (own, wanted) in work.chain.tensions.iter_mut().zip(tensions) {
-                        *own = load * wanted / self.plan.unit;
-                    }
-                    work.ending = if budget == 0 { Ending::Spent } else { Ending::Lost };
-                    work.left = work.chain.assemble(self.plan, EASY);
-                    break;
-                }
-            }
-        }
-        Ok(self.report(work, self.plan.settings.max_iterations - budget))
-    }
-
-    /// Newton's method under given tensions from the point at hand; whether it converged to a minimum.
-    fn settle(&self, work: &mut Scratch, budget: &mut usize) -> bool {
-        let mut moved = 0.0;
-        for _ in 0..PATIENCE {
-            work.left = work.chain.assemble(self.plan, EASY);
-            *budget = budget.saturating_sub(work.left.rounds);
-            moved += work.left.moved;
-            if work.left.worst() <= self.plan.settings.tolerance {
-                return work.left.stable;
-            }
-            if *budget == 0
-                || moved > JUMP
-                || !work.left.worst().is_finite()
-                || !work.chain.solve(self.plan, 0.0)
-            {
-                return false;
-            }
-            for (strain, step) in work.chain.strains.iter_mut().zip(&work.chain.step) {
-                *strain += step;
-            }
-        }
-        false
-    }
-
-    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
-    /// elements; a start that does not help is dropped.
-    ///
-    /// # Errors
-    /// `InvalidInput` for a start with another number of strains.
-    pub fn solve_from(
-        &self,
-        start: &State,
-        displacements: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        work.chain.rest(self.plan);
-        let Chain { strains, tensions, .. } = &mut work.chain;
-        read_state(start, self.plan, strains, tensions)?;
-        work.ending = Ending::Converged;
-        self.resume(displacements, work)
-    }
-
-    /// From the strains and tensions at hand to the displacements; evaluations that took.
-    fn ascend(&self, displacements: &[f64], work: &mut Scratch) -> usize {
-        let plan = self.plan;
-        work.chain.bound(plan, displacements);
-        self.listen(work);
+        work.system.set_bounds(plan, displacements);
+        self.share_stop(work);
         match plan.settings.tendons.equations() {
             Equations::PerTendon => {
                 let mut budget = plan.settings.max_iterations;
-                let Scratch { ascent, chain, .. } = work;
-                (work.ending, work.left) = degenerate_rest::climb(ascent, plan, chain, &mut budget);
+                let Scratch { dual_newton, system, .. } = work;
+                (work.ending, work.residual) =
+                    degenerate_rest::solve(dual_newton, plan, system, &mut budget);
                 plan.settings.max_iterations - budget
             }
             Equations::PerPiece => self.solve_pieces(displacements, work),
@@ -194,12 +131,12 @@ impl<'r> Rod<'r> {
 
     /// The solved quantities, and how the solve ended.
     fn report(&self, work: &mut Scratch, evaluations: usize) -> Report {
-        if work.ending != Ending::Converged && work.chain.stopped() {
+        if work.ending != Ending::Converged && work.system.stops() {
             work.ending = Ending::Stopped;
         }
-        let Scratch { state, chain, .. } = work;
-        write_state(state, self, &chain.strains, &chain.ends, &chain.tensions);
-        told(work.ending, work.left.worst(), evaluations)
+        let Scratch { state, system, .. } = work;
+        write_state(state, self, &system.strains, &system.ends, &system.tensions);
+        report(work.ending, work.residual.worst(), evaluations)
     }
 }
 
@@ -260,8 +197,8 @@ pub(super) fn write_state(
     state.tensions.extend(tensions.iter().map(|t| t * plan.unit));
 }
 
-/// The outcome of so many evaluations, the last of which finds that there is no step to take.
-pub(super) fn told(ending: Ending, residual: f64, evaluations: usize) -> Report {
+/// Report of so many evaluations, the last of which finds that there is no step to take.
+pub(super) fn report(ending: Ending, residual: f64, evaluations: usize) -> Report {
     let status = match ending {
         Ending::Converged => Status::Converged,
         Ending::Lost => Status::Infeasible,
@@ -272,6 +209,8 @@ pub(super) fn told(ending: Ending, residual: f64, evaluations: usize) -> Report 
 }
 
 impl Model for Rod<'_> {
+    const NAME: &'static str = "rod";
+
     type Scratch = Scratch;
 
     fn robot(&self) -> &Robot {
@@ -287,20 +226,92 @@ impl Model for Rod<'_> {
     }
 
     fn solve(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
-        work.chain.rest(self.plan);
-        let rounds = self.ascend(displacements, work);
-        Ok(self.report(work, rounds))
+        work.system.reset(self.plan);
+        let evaluations = self.solve_displacements(displacements, work);
+        Ok(self.report(work, evaluations))
     }
 
     fn resume(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
-        let starts = work.chain.tensions.len() == displacements.len();
+        let starts = work.system.tensions.len() == displacements.len();
         if starts && work.ending == Ending::Converged {
-            let rounds = self.ascend(displacements, work);
+            let evaluations = self.solve_displacements(displacements, work);
             if work.ending == Ending::Converged {
-                return Ok(self.report(work, rounds));
+                return Ok(self.report(work, evaluations));
             }
         }
         self.solve(displacements, work)
+    }
+
+    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
+    /// elements; a start that does not help is dropped.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a start with another number of strains.
+    fn solve_from(
+        &self,
+        start: &State,
+        displacements: &[f64],
+        work: &mut Scratch,
+    ) -> Result<Report, InvalidInput> {
+        work.system.reset(self.plan);
+        let NewtonSystem { strains, tensions, .. } = &mut work.system;
+        read_state(start, self.plan, strains, tensions)?;
+        work.ending = Ending::Converged;
+        self.resume(displacements, work)
+    }
+
+    /// Shape under given tensions, in the unit of the results: displacements follow from it. It is a minimum
+    /// reachable from rest as the tensions grow together; infeasible beyond where that path ends.
+    ///
+    /// # Errors
+    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
+    fn solve_tensions(&self, tensions: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
+        let expected = "sliding tendons where tensions are given";
+        self.plan.settings.tendons.require_tensions("tendons", expected)?;
+        self.plan.check_tensions(tensions)?;
+        let mut budget = self.plan.settings.max_iterations;
+        self.share_stop(work);
+        let Scratch { system, load_stepping, .. } = work;
+        system.reset(self.plan);
+        system.clear_bounds(self.plan);
+        system.active.clear();
+        system.active.extend(tensions.iter().map(|tension| *tension > 0.0));
+        let target = tensions.iter().map(|tension| tension / self.plan.unit);
+        let limits = Limits {
+            newton_steps: NEWTON_STEPS,
+            tolerance: self.plan.settings.tolerance,
+            shortest_load_step: SHORTEST,
+        };
+        (work.ending, work.residual) =
+            load_stepping.solve(self.plan, system, target, &limits, &mut budget);
+        Ok(self.report(work, self.plan.settings.max_iterations - budget))
+    }
+
+    /// Displacements under which a shape has the lengths and tensions that it has, `L − c T − L_rest` \[m\].
+    fn displacements(&self, state: &State) -> Vec<f64> {
+        let plan = self.plan;
+        let rows = state.tendon_lengths.iter().zip(&state.tensions);
+        let plans = plan.rest_lengths.iter().zip(&plan.compliance);
+        let change = |((own, tension), (rest, compliance)): ((&f64, &f64), (&f64, &f64))| {
+            own - compliance * tension / plan.unit - rest
+        };
+        rows.zip(plans).map(change).collect()
+    }
+
+    fn jacobian(
+        &self,
+        displacements: &[f64],
+        start: Option<&State>,
+        work: &mut Scratch,
+    ) -> Result<Result<Matrix6xX<f64>, Report>, InvalidInput> {
+        let report = match start {
+            Some(start) => self.solve_from(start, displacements, work)?,
+            None => self.solve(displacements, work)?,
+        };
+        if report.status != Status::Converged {
+            return Ok(Err(report));
+        }
+        Ok(Ok(self.sensitivity(displacements, work).jacobian(self.robot.tool())))
     }
 
     fn state<'w>(&self, work: &'w Scratch) -> &'w State {
@@ -312,6 +323,8 @@ impl Model for Rod<'_> {
     }
 
     fn message(&self, displacements: &[f64], work: &Scratch) -> String {
-        message(self, displacements, work)
+        let tendon_names = self.robot.tendon_names();
+        let Scratch { ending, state, .. } = work;
+        message(&Failure { plan: self.plan, tendon_names, ending: *ending, state }, displacements)
     }
 }

@@ -1,4 +1,4 @@
-//! What the rod model knows of a robot before any displacement, laid out for the loop.
+//! Plan of the rod: what is known of a robot before any displacement, laid out for the loop.
 
 use super::elasticity::Elasticity;
 use super::settings::RodSettings;
@@ -8,19 +8,35 @@ use crate::error::InvalidInput;
 use crate::robot::{Robot, Tendon};
 
 /// A robot prepared for the rod model.
+///
+/// ```
+/// use tdcr::rod::{Plan, Rod, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// // One plan serves any number of solves.
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let rod = Rod::new(&robot, &plan);
+/// assert!((rod.rest_lengths()[0] - 0.2).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub(crate) settings: RodSettings,
     pub(super) data: Vec<Data>,
     /// Pieces of all subsegments, base first.
     pub(super) pieces: Vec<Piece>,
-    /// Where the pieces of each subsegment begin, and the end.
+    /// First piece of every subsegment, and the end.
     pub(super) starts: Vec<usize>,
     /// Length of every tendon at rest through these elements \[m\].
     pub(super) rest_lengths: Vec<f64>,
-    /// The same of every piece.
+    /// Length of every piece at rest through these elements \[m\].
     pub(super) piece_lengths: Vec<f64>,
-    /// What a tendon becomes longer by under one unit of tension \[m\]: 0 for a rigid one.
+    /// Compliance c of every tendon: elongation under one unit of tension \[m\], 0 for a rigid one.
     pub(crate) compliance: Vec<f64>,
     /// Largest length² over bending stiffness: a tension times this is a load of order 1 for a subsegment.
     pub(crate) slenderness: f64,
@@ -41,6 +57,7 @@ impl Plan {
     pub fn new(robot: &Robot, settings: RodSettings) -> Result<Self, InvalidInput> {
         settings.validate()?;
         let backbone = robot.backbone();
+        // Elasticity of elements and tendons is relative to the backbone's.
         if !backbone.has_stiffness() {
             if settings.axial {
                 let expected =
@@ -55,6 +72,7 @@ impl Plan {
                 return Err(InvalidInput::new("youngs_modulus", expected, "none"));
             }
         }
+        // Subsegments and their pieces, in a unit in which a uniform backbone's stiffness is its length.
         let (n, elements) = (backbone.subsegments(), settings.elements as f64);
         let unit = backbone.bending_stiffness(0) / backbone.total_length();
         let mut data = Vec::with_capacity(n);
@@ -63,10 +81,12 @@ impl Plan {
         let mut slenderness = 0.0_f64;
         for i in 0..n {
             let length = backbone.lengths()[i] / elements;
+            // K and the rest strain of an element.
             let elasticity = Elasticity::new(backbone, i, length, elements, unit);
             data.push(Data { length, elasticity });
             slenderness = slenderness.max(elements * elements * length / elasticity.bending());
             starts.push(pieces.len());
+            // Tendons that run through it, from hole to hole.
             for (tendon, path) in robot.paths().iter().enumerate() {
                 if path.end() > i {
                     pieces.push(Piece { tendon, from: path.holes[i], to: path.holes[i + 1] });
@@ -88,15 +108,17 @@ impl Plan {
             parts: Vec::new(),
             unit,
         };
+        // Lengths at rest, and the compliances c = L_rest / EA.
         plan.piece_lengths = plan.lengths_at_rest();
         plan.rest_lengths = vec![0.0; count];
         for (piece, length) in plan.pieces.iter().zip(&plan.piece_lengths) {
             plan.rest_lengths[piece.tendon] += length;
         }
-        let give = |(tendon, length): (&Tendon, &f64)| {
+        let compliance = |(tendon, length): (&Tendon, &f64)| {
             tendon.stiffness().map_or(0.0, |stiffness| length * unit / stiffness)
         };
-        plan.compliance = robot.tendons().iter().zip(&plan.rest_lengths).map(give).collect();
+        plan.compliance = robot.tendons().iter().zip(&plan.rest_lengths).map(compliance).collect();
+        // Where subsegments share nothing, each is a plan of its own.
         plan.parts = match settings.tendons.equations() {
             Equations::PerTendon => Vec::new(),
             Equations::PerPiece => (0..n).map(|i| plan.part(i)).collect(),
@@ -143,7 +165,13 @@ impl Plan {
         }
     }
 
-    /// How displacements are imposed.
+    /// Settings that it was made with.
+    #[must_use]
+    pub fn settings(&self) -> &RodSettings {
+        &self.settings
+    }
+
+    /// Law by which displacements are imposed.
     pub(crate) fn tendon_law(&self) -> TendonLaw {
         self.settings.tendons
     }
@@ -168,7 +196,7 @@ impl Plan {
         (0..self.data.len()).map(|i| self.length(i)).sum()
     }
 
-    /// Whether tensions are those of a solve.
+    /// Checks tensions that are given.
     pub(super) fn check_tensions(&self, tensions: &[f64]) -> Result<(), InvalidInput> {
         if tensions.len() != self.rest_lengths.len() {
             let expected = format!("{} values, one per tendon", self.rest_lengths.len());

@@ -4,6 +4,13 @@ use super::tendon_law::TendonLaw;
 use crate::error::InvalidInput;
 
 /// Kinematics of an element (design rule of the papers, or a rod's own).
+///
+/// ```
+/// use tdcr::rod::{RodSettings, Subsegment};
+///
+/// let settings = RodSettings { subsegment: Subsegment::Link, ..RodSettings::default() };
+/// assert_eq!(settings.subsegment.as_str(), "link");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Subsegment {
     /// A constant-strain arc.
@@ -28,13 +35,21 @@ impl Subsegment {
 }
 
 /// Choices of the rod model.
+///
+/// ```
+/// use tdcr::rod::RodSettings;
+///
+/// let settings = RodSettings { elements: 2, ..RodSettings::default() };
+/// assert!(settings.validate().is_ok());
+/// assert!(RodSettings { elements: 0, ..settings }.validate().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RodSettings {
     /// Kinematics of an element.
     pub subsegment: Subsegment,
-    /// How displacements are imposed.
+    /// Law by which displacements are imposed.
     pub tendons: TendonLaw,
-    /// Whether elements stretch; needs Young's modulus and diameter.
+    /// Elements stretch; needs Young's modulus and diameter.
     pub axial: bool,
     /// Elements between two disks.
     pub elements: usize,
@@ -63,7 +78,7 @@ impl Default for RodSettings {
 
 /// Elements per subsegment at most.
 const MOST_ELEMENTS: usize = 100;
-/// What rounding leaves of a thousand subsegments; below it, shapes that exist would be infeasible.
+/// Rounding of a thousand subsegments; below it, shapes that exist would be infeasible.
 const LEAST_TOLERANCE: f64 = 1e-13;
 
 impl RodSettings {

@@ -1,8 +1,9 @@
-//! Strains that take a rod through wanted places, and the rest shape that has them under tension.
+//! Stepwise inverse: strains that take a rod through wanted points, and the rest shape that has them under tension.
 //!
-//! With the final strains ω and the tensions T known, every subsegment's balance gives its rest shape:
-//! `K (ω − ω_rest) + Σ T ∂L/∂ω = 0`. So a rod is marched from the base, each subsegment bent to point its end at
-//! the wanted place and twisted so that its rest shape is not; one equation per tendon is left for T.
+//! With the final strains w and the tensions T known, every subsegment's equilibrium gives its rest shape:
+//! `K (w − w_rest) + Σ T ∂L/∂w = 0`. So the rod is solved from the base on, subsegment by subsegment: each one bends to
+//! point its end at the wanted point, and turns so that its rest shape has the wanted twist. One equation per tendon is
+//! left for T.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -10,27 +11,31 @@ use super::plan::Plan;
 use super::subsegment::{Derivatives, Local};
 use crate::lie::Pose;
 
-/// A march: strains, rest shape, places and the tendons' lengths.
+/// Stepwise inverse: strains, rest shape and what the tendons are longer.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct March {
+pub(crate) struct StepwiseInverse {
     pub(crate) strains: Vec<Vector3<f64>>,
     pub(crate) rest: Vec<Vector3<f64>>,
-    /// What each tendon is longer than at rest \[m\].
-    pub(crate) stretch: Vec<f64>,
+    /// Difference of each tendon's length from that at rest \[m\].
+    pub(crate) elongations: Vec<f64>,
     local: Local,
     hessian: Vec<f64>,
     rows: Vec<f64>,
     lengths: Vec<f64>,
 }
 
-/// Newton steps of one subsegment, and when its direction is met.
+/// Newton steps of one subsegment at most, its residual that counts as solved, and the one below which it is rounding
+/// once it falls no longer.
 const STEPS: usize = 30;
-const MET: f64 = 1e-15;
+const SOLVED: f64 = 1e-15;
+const ROUNDING: f64 = 1e-13;
+/// No strain moves further in one step \[rad\].
+const STEP: f64 = 0.5;
 
-impl March {
-    /// Marches from the base frame to `targets` (one per disk from the first) under tensions in the plan's
-    /// unit. False when a subsegment finds no way. One element per subsegment, without elongation.
-    pub(crate) fn go(
+impl StepwiseInverse {
+    /// Solves from the base frame on for `targets` (one per disk from the first) and rest twists under tensions in the
+    /// plan's unit. False when a subsegment has no solution. One element per subsegment, without elongation.
+    pub(crate) fn solve(
         &mut self,
         plan: &Plan,
         base: &Pose,
@@ -38,49 +43,52 @@ impl March {
         twists: &[f64],
         tensions: &[f64],
     ) -> bool {
-        let taut = vec![true; tensions.len()];
+        let active = vec![true; tensions.len()];
         self.strains.clear();
         self.rest.clear();
-        self.stretch.clear();
-        self.stretch.resize(tensions.len(), 0.0);
+        self.elongations.clear();
+        self.elongations.resize(tensions.len(), 0.0);
         let mut frame = *base;
         for (i, target) in targets.iter().enumerate() {
             let wanted = frame.rotation.tr_mul(&(target - frame.translation));
-            let Some((strain, rest)) = self.bend(plan, i, &wanted, twists[i], tensions, &taut)
+            let Some((strain, rest)) =
+                self.solve_subsegment(plan, i, &wanted, twists[i], tensions, &active)
             else {
                 return false;
             };
             frame = frame.compose(&self.local.end());
             self.strains.push(strain);
             self.rest.push(rest);
-            self.measure(plan, i, 1.0);
+            self.add_lengths(plan, i, 1.0);
             self.local.place::<3>(plan.settings.subsegment, &plan.data[i], rest.as_slice());
-            self.measure(plan, i, -1.0);
+            self.add_lengths(plan, i, -1.0);
         }
         true
     }
 
-    fn measure(&mut self, plan: &Plan, i: usize, sign: f64) {
+    fn add_lengths(&mut self, plan: &Plan, i: usize, sign: f64) {
         let end = self.local.end();
         for piece in &plan.pieces[plan.starts[i]..plan.starts[i + 1]] {
             let length = (end.transform(&piece.to) - piece.from).norm();
-            self.stretch[piece.tendon] += sign * length;
+            self.elongations[piece.tendon] += sign * length;
         }
     }
 
-    /// Strain and rest strain of the subsegment whose end lies in the direction of `wanted`.
-    fn bend(
+    /// Strain and rest strain of the subsegment whose end lies in the direction of `wanted`: Newton's method on the
+    /// two components of the end across that direction and on the moment about z.
+    fn solve_subsegment(
         &mut self,
         plan: &Plan,
         i: usize,
         wanted: &Vector3<f64>,
         twist: f64,
         tensions: &[f64],
-        taut: &[bool],
+        active: &[bool],
     ) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let data = &plan.data[i];
         let elasticity = &data.elasticity;
         let pieces = &plan.pieces[plan.starts[i]..plan.starts[i + 1]];
+        // The arc from the base to the wanted point is the start: it turns by twice the angle of its chord.
         let direction = wanted.try_normalize(0.0)?;
         let across = wanted.xy().norm();
         let angle = 2.0 * across.atan2(wanted.z);
@@ -89,6 +97,7 @@ impl March {
         } else {
             Vector3::zeros()
         };
+        // Two axes across the direction.
         let first = if direction.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
         let first = first.cross(&direction).normalize();
         let second = direction.cross(&first);
@@ -110,24 +119,26 @@ impl March {
                 pieces,
                 strain.as_slice(),
                 tensions,
-                taut,
+                active,
                 &mut out,
             );
-            // Slopes of energy and tendons count from this subsegment's own rest twist: from the wanted one.
-            let off = elasticity.strain_under(2, elasticity.with_rest(2, gradient[2], twist));
+            // The gradient counts from this subsegment's own rest twist; the moment from the wanted one.
+            let moment = elasticity.strain_under(2, elasticity.with_rest(2, gradient[2], twist));
+            // Residual: components of the end across the direction, relative to the length, and that moment.
             let node = &self.local.nodes[0];
             let end = self.local.end().translation / data.length;
-            let residual = Vector3::new(first.dot(&end), second.dot(&end), off);
+            let residual = Vector3::new(first.dot(&end), second.dot(&end), moment);
             let size = residual.amax();
             if size.is_nan() {
                 return None;
             }
-            // At rounding the residual no longer falls.
-            if size <= MET || (size < 1e-13 && size >= 0.5 * before) {
+            // Solved: the rest strain for which the gradient is zero. At rounding the residual no longer falls.
+            if size <= SOLVED || (size < ROUNDING && size >= 0.5 * before) {
                 let rest = Vector3::from_fn(|c, _| elasticity.balanced_rest(c, gradient[c]));
                 return Some((strain, Vector3::new(rest.x, rest.y, twist)));
             }
             before = size;
+            // Newton step; the moment changes with the Hessian's last row.
             let sweep = Matrix3::from_columns(&node.sweep[..3]) / data.length;
             let h = &self.hessian;
             let jacobian = Matrix3::from_rows(&[
@@ -136,7 +147,8 @@ impl March {
                 Vector3::new(h[6], h[7], h[8]).map(|h| elasticity.strain_under(2, h)).transpose(),
             ]);
             let step = jacobian.try_inverse()? * residual;
-            let share = 1.0_f64.min(0.5 / step.amax().max(f64::MIN_POSITIVE));
+            // No strain moves by more than a longest step.
+            let share = 1.0_f64.min(STEP / step.amax().max(f64::MIN_POSITIVE));
             strain -= step * share;
         }
         None

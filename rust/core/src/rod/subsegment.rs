@@ -19,7 +19,7 @@ pub(super) struct Piece {
     pub(super) to: Vector3<f64>,
 }
 
-/// What a subsegment is, in units of the robot's stiffness.
+/// Length and elasticity of a subsegment's elements, in units of the robot's stiffness.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Data {
     /// Rest length of an element \[m\].
@@ -31,11 +31,11 @@ pub(super) struct Data {
 /// Values and derivatives at a point, in slices of the caller's arrays.
 #[derive(Debug)]
 pub(super) struct Derivatives<'a> {
-    /// Of the energy and the tensions' work, by the strains.
+    /// Gradient of the energy and the tensions' work by the strains.
     pub(super) gradient: &'a mut [f64],
-    /// Lower triangle, row by row; blocks above the diagonal are written too.
+    /// Hessian, lower triangle, row by row; blocks above the diagonal are written too.
     pub(super) hessian: &'a mut [f64],
-    /// Of every piece's length, one row per piece.
+    /// Gradient of every piece's length, one row per piece.
     pub(super) rows: &'a mut [f64],
     /// Length of every piece \[m\].
     pub(super) lengths: &'a mut [f64],
@@ -50,13 +50,13 @@ pub(super) struct Node {
     /// Angular velocity of its end, and velocity of its end, by its unknowns.
     pub(super) spin: [Vector3<f64>; 4],
     pub(super) sweep: [Vector3<f64>; 4],
-    /// Velocity of the hole that was looked at last, by its unknowns.
+    /// Velocity of the hole of the piece added last, by its unknowns.
     pub(super) moved: [Vector3<f64>; 4],
     /// Sums over tendons of force, moment and dyad for its own curvature, in its own axes.
     force: Vector3<f64>,
     moment: Vector3<f64>,
     dyad: Matrix3<f64>,
-    /// Of the couple that turning a nearer element adds.
+    /// Couple that turning a nearer element adds.
     couple: [Vector3<f64>; 4],
 }
 
@@ -154,7 +154,7 @@ impl Local {
         self.nodes.last().map_or_else(Pose::identity, |node| node.end)
     }
 
-    /// Derivatives at the strains placed last, for tensions by tendon; pieces of tendons that are not `taut`
+    /// Derivatives at the strains placed last, for tensions by tendon; pieces of tendons that are not `active`
     /// are left out.
     #[inline(always)]
     pub(super) fn differentiate<const D: usize, const ONE: bool>(
@@ -163,7 +163,7 @@ impl Local {
         pieces: &[Piece],
         strains: &[f64],
         tensions: &[f64],
-        taut: &[bool],
+        active: &[bool],
         out: &mut Derivatives<'_>,
     ) {
         let count = if ONE { 1 } else { self.nodes.len() };
@@ -171,35 +171,39 @@ impl Local {
         for (e, node) in self.nodes.iter_mut().enumerate() {
             node.set_velocities::<D>(e == 0);
         }
+        // Energy: K (w − w_rest) and K.
         out.hessian.fill(0.0);
         for e in 0..count {
             let elasticity = &data.elasticity;
             elasticity.differentiate::<D>(strains, D * e, size, out.gradient, out.hessian);
         }
-        let mut pulled = false;
+        // Work of the tensions: T ∂L/∂x, and T ∂²L/∂x² but for the curvature of the paths of the holes.
+        let mut any_tension = false;
         for (p, piece) in pieces.iter().enumerate() {
-            if !taut[piece.tendon] {
+            if !active[piece.tendon] {
                 continue;
             }
             let row = &mut out.rows[p * size..(p + 1) * size];
             let tension = tensions[piece.tendon];
-            out.lengths[p] = self.pull::<D, ONE>(piece, tension, row, out.hessian);
+            // A tendon without tension has a row, but does no work.
+            out.lengths[p] = self.add_piece::<D, ONE>(piece, tension, row, out.hessian);
             if tension != 0.0 {
-                pulled = true;
+                any_tension = true;
                 for (gradient, a) in out.gradient.iter_mut().zip(row.iter()) {
                     *gradient += tension * a;
                 }
             }
         }
-        if pulled {
+        // That curvature, for all tendons at once.
+        if any_tension {
             self.add_curvature::<D, ONE>(out.hessian);
         }
     }
 
-    /// One tendon: the derivatives of its length into `row`, what its direction adds to the Hessian, and the
-    /// sums for the curvature of the path of its hole. Returns its length.
+    /// Adds one piece: the derivatives of its length into `row`, the turn of its direction to the Hessian, and its
+    /// force to the sums for the curvature of the path of its hole. Returns its length.
     #[inline(always)]
-    fn pull<const D: usize, const ONE: bool>(
+    fn add_piece<const D: usize, const ONE: bool>(
         &mut self,
         piece: &Piece,
         tension: f64,
@@ -208,6 +212,7 @@ impl Local {
     ) -> f64 {
         let count = if ONE { 1 } else { self.nodes.len() };
         let size = D * count;
+        // Direction u of the piece, which pulls the hole back along it.
         let point = self.end().transform(&piece.to);
         let line = point - piece.from;
         let length = line.norm();
@@ -217,6 +222,7 @@ impl Local {
         for e in 0..count {
             let node = &mut self.nodes[e];
             let lever = point - node.end.translation;
+            // ∂L/∂x = u·∂p/∂x.
             let turned = lever.cross(&u);
             for c in 0..3 {
                 row[D * e + c] = node.sweep[c].dot(&u) + node.spin[c].dot(&turned);
@@ -225,17 +231,20 @@ impl Local {
                 row[D * e + 3] = node.sweep[3].dot(&u);
             }
             if tension != 0.0 {
+                // Sums of u, x × u and u xᵀ in the element's own axes.
                 let own = if e == 0 { force } else { node.base.rotation.tr_mul(&force) };
                 let x = if ONE { piece.to } else { node.end.rotation.tr_mul(&lever) };
                 node.force += own;
                 node.moment += x.cross(&own);
                 node.dyad += own * x.transpose();
+                // ∂p/∂x, the velocity of the hole.
                 for c in 0..3 {
                     node.moved[c] = node.sweep[c] + node.spin[c].cross(&lever);
                 }
                 if D == 4 {
                     node.moved[3] = node.sweep[3];
                 }
+                // ω_b × ∂p/∂a of the elements nearer to the base.
                 if e > 0 {
                     for c in 0..D {
                         node.couple[c] += node.moved[c].cross(&force);
@@ -243,6 +252,7 @@ impl Local {
                 }
             }
         }
+        // T/L (∂p/∂a·∂p/∂b − ∂L/∂a ∂L/∂b): the turn of the direction.
         if tension != 0.0 {
             for e in 0..count {
                 for f in 0..=e {
@@ -311,8 +321,8 @@ impl Local {
         energy + work.sum::<f64>()
     }
 
-    /// Moves by a share of the Newton step of factored derivatives that lowers the value, and returns how
-    /// far; nothing when none does.
+    /// Moves by a share of the Newton step of factored derivatives that lowers energy and work (Armijo's rule), and
+    /// returns the largest change of a strain; nothing when no share does.
     pub(super) fn relax<const D: usize>(
         &mut self,
         kind: Subsegment,
@@ -325,6 +335,7 @@ impl Local {
         let size = strains.len();
         let (mut step, mut trial) =
             (std::mem::take(&mut self.step), std::mem::take(&mut self.trial));
+        // −H⁻¹ g.
         step.clear();
         step.extend(at.gradient.iter().map(|g| -g));
         forward(at.hessian, size, &mut step);
@@ -332,8 +343,9 @@ impl Local {
         let before = self.value::<D>(data, pieces, strains, tensions);
         let slope = dot(at.gradient, &step);
         let longest = step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+        // Backtracking.
         let mut share = if longest > STEP { STEP / longest } else { 1.0 };
-        let mut went = None;
+        let mut moved = None;
         for _ in 0..BACKTRACKS {
             trial.clear();
             trial.extend(strains.iter().zip(&step).map(|(strain, s)| strain + share * s));
@@ -341,12 +353,12 @@ impl Local {
             let after = self.value::<D>(data, pieces, &trial, tensions);
             if after <= before + ARMIJO * share * slope + ROUNDING * before {
                 strains.copy_from_slice(&trial);
-                went = Some(share * longest);
+                moved = Some(share * longest);
                 break;
             }
             share *= 0.5;
         }
         (self.step, self.trial) = (step, trial);
-        went
+        moved
     }
 }

@@ -6,6 +6,13 @@
 use crate::error::InvalidInput;
 
 /// Law of a tendon that runs from hole to hole: how its displacement is imposed.
+///
+/// ```
+/// use tdcr::rod::{RodSettings, TendonLaw};
+///
+/// let settings = RodSettings { tendons: TendonLaw::Proportional, ..RodSettings::default() };
+/// assert_eq!(settings.tendons.as_str(), "proportional");
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum TendonLaw {
     /// The total length is bounded; no friction. The multiplier is the tension.
@@ -42,11 +49,11 @@ pub(super) struct PieceBound {
 /// Rates of what the bound depends on, or weights by them \[m\].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct BoundRate {
-    /// Of the length of the piece at rest.
+    /// Rate of the length of the piece at rest.
     pub(super) piece: f64,
-    /// Of the length of the whole tendon at rest.
+    /// Rate of the length of the whole tendon at rest.
     pub(super) tendon: f64,
-    /// Of the displacement.
+    /// Rate of the displacement.
     pub(super) displacement: f64,
     /// Of the elastic strain.
     pub(super) strain: f64,

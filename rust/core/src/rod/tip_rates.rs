@@ -1,4 +1,4 @@
-//! What the strains of a solved rod do to a point at its tip, in one pass along it.
+//! Rates of a point at the tip of a solved rod by its strains, in one pass along it.
 
 use nalgebra::Vector3;
 
@@ -8,7 +8,7 @@ use crate::lie::Pose;
 use crate::solve::dense::forward;
 
 /// A solved rod: strains, factors of the subsegments' Hessians, and the frame of every disk.
-pub(super) struct Solved<'a> {
+pub(super) struct SolvedRod<'a> {
     pub(super) strains: &'a [f64],
     pub(super) factors: &'a [f64],
     pub(super) frames: &'a [Pose],
@@ -16,19 +16,19 @@ pub(super) struct Solved<'a> {
 
 /// Buffers of a pass.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sweep {
+pub(super) struct TipRates {
     local: Local,
     rows: Vec<f64>,
 }
 
-impl Sweep {
+impl TipRates {
     /// Calls `each(i, rows)` for every subsegment: six rows `L⁻¹ pᵀ`, p the velocity of a point that moves with
     /// the tip, then its angular velocity, by the subsegment's strains, in the axes of the frames. The rows times
-    /// an image of a tendon are then `p H⁻¹ aᵀ`.
-    pub(super) fn run<const D: usize>(
+    /// a whitened row of a tendon are then `p H⁻¹ aᵀ`.
+    pub(super) fn for_each_subsegment<const D: usize>(
         &mut self,
         plan: &Plan,
-        at: &Solved<'_>,
+        at: &SolvedRod<'_>,
         point: &Vector3<f64>,
         mut each: impl FnMut(usize, &[f64]),
     ) {

@@ -33,8 +33,12 @@ pub(crate) fn number(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> 
     })
 }
 
-/// What a function returned for one point, as a number.
-pub(crate) fn returned(argument: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+/// Number that a function returned for one point.
+pub(crate) fn number_of_point(
+    argument: &str,
+    expected: &str,
+    value: &Bound<'_, PyAny>,
+) -> PyResult<f64> {
     if let Ok(value) = value.cast::<PyFloat>() {
         return Ok(value.value());
     }

@@ -99,11 +99,11 @@ pub(crate) fn float_array<'py>(
     let float = numpy.call_method1("ascontiguousarray", (&array, "float64"))?;
     // ascontiguousarray makes a 0-d array 1-d; shapes are checked on the original.
     let shape = array.getattr("shape")?;
-    aligned(float.call_method1("reshape", (shape,))?)?.extract()
+    align(float.call_method1("reshape", (shape,))?)?.extract()
 }
 
-/// An array whose numbers are where the processor wants them: a copy of one from a packed record.
-pub(crate) fn aligned(array: Bound<'_, PyAny>) -> PyResult<Bound<'_, PyAny>> {
+/// Array whose numbers are aligned in memory: itself, or a copy of one from a packed record.
+pub(crate) fn align(array: Bound<'_, PyAny>) -> PyResult<Bound<'_, PyAny>> {
     let sound = array.getattr("flags")?.getattr("aligned")?.extract()?;
     if sound { Ok(array) } else { array.call_method0("copy") }
 }
@@ -173,6 +173,17 @@ pub(crate) fn frozen<T: Element>(
     let array = PyArray::from_vec(py, values).reshape(shape.to_vec())?;
     array.call_method1("setflags", (false,))?;
     Ok(array.into_any().unbind())
+}
+
+/// Statuses as a read-only array of `tdcr.Status`.
+pub(crate) fn frozen_statuses(
+    py: Python<'_>,
+    statuses: impl Iterator<Item = Status>,
+) -> PyResult<Py<PyAny>> {
+    let members = statuses.map(|one| Ok(status(py, one)?.unbind()));
+    let members = members.collect::<PyResult<Vec<_>>>()?;
+    let rows = members.len();
+    frozen(py, members, &[rows])
 }
 
 /// Three numbers as a read-only array.

@@ -1,4 +1,4 @@
-//! Long calls: work on the pool without the GIL while the calling thread listens for Ctrl-C.
+//! Work that Ctrl-C can stop: it goes on without the GIL while the calling thread listens.
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -10,8 +10,21 @@ use pyo3::prelude::*;
 
 use tdcr::batch::Control;
 
-/// How often signals are looked at and progress is told.
-const POLL: Duration = Duration::from_millis(50);
+/// Time from one look at signals, and one report of progress, to the next.
+pub(crate) const POLL: Duration = Duration::from_millis(50);
+
+/// Runs `job` with the GIL released. If it may take longer than until the first look at signals, it runs on another
+/// thread, as [`run`] does it. The caller estimates the microseconds of a hard case from docs/benchmarks.md.
+pub(crate) fn run_if_long<T: Send>(
+    py: Python<'_>,
+    estimated_microseconds: f64,
+    job: impl FnOnce(&Control) -> T + Send,
+) -> PyResult<T> {
+    if estimated_microseconds < POLL.as_secs_f64() * 1e6 {
+        return Ok(py.detach(|| job(&Control::default())));
+    }
+    run(py, None, job)
+}
 
 /// Runs `job` on another thread with the GIL released. Every 50 ms signal handlers run and
 /// `progress` (a Python callable) gets the rows finished so far; an exception from either stops the

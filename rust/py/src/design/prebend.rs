@@ -1,26 +1,22 @@
 //! The engines of `tdcr.design`; its docstrings are in Python.
 
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use tdcr::design::{angle_at_base, points_on_curve, prebend_stopped_by};
+use tdcr::forward::{ModelSettings, Solution};
 use tdcr::rod::Subsegment;
 
 use crate::convert::arrays::{frozen, frozen_points, invalid, status, vectors};
 use crate::convert::interruptible;
-use crate::forward::model_choice::Choice;
 use crate::forward::one_row;
 use crate::forward::shape::Shape;
 use crate::robot::Robot;
 use crate::settings::fields::Choice as _;
 use crate::settings::prebend::PrebendSettings;
 
-/// Products of small matrices in a descent, of about a microsecond each with all its starts, up to which a design
-/// ends soon enough to go without listening for Ctrl-C.
-const SOON: usize = 100_000;
+/// Estimated time of a product of small matrices in a descent, with all its starts \[µs\].
+const MICROSECONDS_PER_PRODUCT: f64 = 0.5;
 
 /// Robot, shape, errors, iterations, status and message of a design.
 #[pyfunction]
@@ -34,18 +30,16 @@ pub(crate) fn _prebend<'py>(
     let targets = vectors("target_positions", targets)?;
     let pulls = one_row(robot, displacements)?;
     let (core, settings) = (&robot.get().0, settings.get().0);
-    let solve =
-        |stop: &Arc<AtomicBool>| prebend_stopped_by(core, &targets, &pulls, &settings, stop);
-    let work = targets.len().pow(3) * settings.rod.elements;
-    let answer = if work.saturating_mul(settings.max_iterations) <= SOON {
-        py.detach(|| solve(&Arc::default()))
-    } else {
-        interruptible::run(py, None, |control| solve(&control.stop))?
-    };
+    let products = (targets.len().pow(3) * settings.rod.elements) as f64;
+    let microseconds = products * settings.max_iterations as f64 * MICROSECONDS_PER_PRODUCT;
+    let answer = interruptible::run_if_long(py, microseconds, |control| {
+        prebend_stopped_by(core, &targets, &pulls, &settings, &control.stop)
+    })?;
     let answer = answer.map_err(|e| invalid(&e))?;
     let disks = answer.errors.len();
     let robot = Robot::from(answer.robot);
-    let shape = Shape::new(robot.clone(), Choice::Rod(settings.rod), pulls, answer.shape);
+    let solution = Solution { displacements: pulls, shape: answer.shape };
+    let shape = Shape::new(robot.clone(), ModelSettings::Rod(settings.rod), solution);
     let fields = [
         Bound::new(py, robot)?.into_any(),
         Bound::new(py, shape)?.into_any(),

@@ -5,11 +5,11 @@ use pyo3::types::PyTuple;
 
 use tdcr::batch::pool;
 use tdcr::design::{self, Routed, routing_rows, routing_stopped_by};
+use tdcr::forward::{ModelSettings, Solution};
 
 use crate::convert::arguments::{optional, whole};
 use crate::convert::arrays::{frozen, invalid, status, vectors};
 use crate::convert::interruptible;
-use crate::forward::model_choice::Choice;
 use crate::forward::shape::Shape;
 use crate::robot::Robot;
 use crate::settings::bounds::range;
@@ -25,7 +25,8 @@ fn fields<'py>(
     let (disks, tendons) = (answer.errors.len(), answer.displacements.len());
     let robot = Robot::from(answer.robot);
     let pulls = answer.displacements.clone();
-    let shape = Shape::new(robot.clone(), Choice::Rod(settings.rod), pulls, answer.shape);
+    let solution = Solution { displacements: pulls, shape: answer.shape };
+    let shape = Shape::new(robot.clone(), ModelSettings::Rod(settings.rod), solution);
     let holes = match answer.holes {
         Some(holes) => {
             let rows = holes.into_iter().map(|row| PyTuple::new(py, row));

@@ -1,28 +1,21 @@
 //! The engine of `forward_batch`.
 
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex};
-
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
-use rayon::ThreadPool;
 
-use tdcr::batch::{Field, Key, Solved, chain_rows, pool, solve_rows};
-use tdcr::constant_curvature::ConstantCurvature;
-use tdcr::linkage::Linkage;
-use tdcr::model::Model;
-use tdcr::rod::Rod;
-use tdcr::rod::contact::LoadedRod;
-use tdcr::{InvalidInput, Status};
+use tdcr::Status;
+use tdcr::batch::{Field, Key, Solved, pool};
+use tdcr::forward::{Forward, Rows, Solution};
 
 use crate::convert::arguments::{optional, whole};
-use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
+use crate::convert::arrays::{float_array, frozen, frozen_statuses, invalid, values, wrong_shape};
 use crate::convert::interruptible;
-use crate::forward::model_choice::{Choice, not_around};
+use crate::forward::model_choice::model_settings;
+use crate::forward::run;
+use crate::forward::shape::Shape;
 use crate::robot::Robot;
-use crate::scene::contact;
-use crate::scene::{self, Surroundings, Watched};
+use crate::scene::{Surroundings, contact, raise_fault};
 
 /// Names of the fields a batch can have.
 #[pyfunction]
@@ -48,17 +41,12 @@ pub(crate) fn _forward_batch<'py>(
     progress: Option<&Bound<'py, PyAny>>,
     warm: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let choice = Choice::new(model, settings)?;
-    if warm && !matches!(choice, Choice::Rod(_)) {
-        let got = format!("True for model \"{model}\"");
-        return Err(invalid(&InvalidInput::new("warm", "False, or model \"rod\"", got)));
-    }
+    let settings = model_settings(model, settings)?;
+    settings.check_warm(warm).map_err(|e| invalid(&e))?;
     let around = Surroundings::new(py, Some(obstacles), loads)?;
-    if around.any().is_some() && !matches!(choice, Choice::Rod(_)) {
-        return Err(not_around(&around, model));
-    }
     let core = &robot.get().0;
     let tendons = core.tendons().len();
+    // A row of displacements per solve.
     let array = float_array("displacements", displacements)?;
     let &[rows, columns] = array.shape() else {
         let expected = format!("shape (B, {tendons}); forward takes ({tendons},)");
@@ -68,75 +56,61 @@ pub(crate) fn _forward_batch<'py>(
         let expected = format!("shape (B, {tendons}), one column per tendon");
         return Err(wrong_shape("displacements", &expected, array.shape()));
     }
+    // Fields and threads.
     let fields = fields.iter().map(|name| Field::named(name)).collect::<Result<Vec<_>, _>>();
     let fields = fields.map_err(|e| invalid(&e))?;
     let threads = optional("threads", threads, whole)?;
     let pool = pool(threads).map_err(|e| invalid(&e))?;
     let flat = values(&array)?;
-    let batch = Batch { displacements: flat, rows, tendons, fields: &fields, pool: &pool, warm };
-    let kept = robot.get();
-    let solved = match choice {
-        Choice::Rod(settings) => {
-            let plan = kept.rod_plan(settings).map_err(|e| invalid(&e))?;
-            if around.any().is_some() {
-                let scene = around.scene(core, &plan, &settings).map_err(|e| invalid(&e))?;
-                let rod = LoadedRod::new(core, &plan, &scene).map_err(|e| invalid(&e))?;
-                let fault = Mutex::new(None);
-                let watched = |stop| {
-                    around.stopped_by(&stop);
-                    Watched::new(rod, stop, &fault)
-                };
-                // After Ctrl-C, which is raised here, functions fail because of it.
-                let solved = batch.solve(py, watched, progress)?;
-                scene::checked(py, fault)?;
-                return export(py, &batch, solved);
-            }
-            let rod = |stop| Rod::new(core, &plan).stopped_by(stop);
-            batch.solve(py, rod, progress)
-        }
-        Choice::Linkage(settings) => {
-            let plan = kept.linkage_plan().map_err(|e| invalid(&e))?;
-            let model = Linkage::new(core, plan, settings).map_err(|e| invalid(&e))?;
-            batch.solve(py, |_| model, progress)
-        }
-        Choice::ConstantCurvature(settings) => {
-            let plan = kept.constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
-            batch.solve(py, |_| ConstantCurvature::new(core, plan), progress)
-        }
-    }?;
-    export(py, &batch, solved)
+    let wanted = Rows { displacements: flat, count: rows, fields: &fields, warm };
+    // All rows on the pool.
+    let forward = around.prepare(core, settings)?;
+    let (solved, fault) = interruptible::run(py, progress, |control| {
+        around.stopped_by(&control.stop);
+        let forward = forward.stopped_by(&control.stop);
+        (forward.solve_rows(&wanted, &pool, control), forward.take_fault())
+    })?;
+    // After Ctrl-C, which run has raised, functions fail because of it; an empty answer then is never seen.
+    raise_fault(py, fault)?;
+    let solved = solved.map_err(|e| invalid(&e))?.unwrap_or_default();
+    export(py, &wanted, tendons, solved)
 }
 
-/// What all models' batches have.
-struct Batch<'a> {
-    displacements: &'a [f64],
-    rows: usize,
-    tendons: usize,
-    fields: &'a [Field],
-    pool: &'a ThreadPool,
-    warm: bool,
-}
-
-impl Batch<'_> {
-    /// Solves all rows with a model that may listen to a stop flag.
-    fn solve<M: Model>(
-        &self,
-        py: Python<'_>,
-        model: impl FnOnce(Arc<AtomicBool>) -> M + Send,
-        progress: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Solved> {
-        let &Self { displacements, rows, fields, pool, warm, .. } = self;
-        let solve = if warm { chain_rows } else { solve_rows };
-        let solved = interruptible::run(py, progress, |control| {
-            solve(&model(Arc::clone(&control.stop)), displacements, rows, fields, pool, control)
-        })?;
-        // Stopped only by an interrupt, which run has raised; an empty answer then is never seen.
-        Ok(solved.map_err(|e| invalid(&e))?.unwrap_or_default())
+/// One row of a warm batch, its chain solved up to there.
+#[pyfunction]
+pub(crate) fn _chained_shape(
+    py: Python<'_>,
+    robot: &Bound<'_, Robot>,
+    displacements: &Bound<'_, PyAny>,
+    row: usize,
+    settings: Option<&Bound<'_, PyAny>>,
+    obstacles: &Bound<'_, PyAny>,
+    loads: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Shape> {
+    let settings = model_settings("rod", settings)?;
+    let array = float_array("displacements", displacements)?;
+    let flat = values(&array)?;
+    let core = &robot.get().0;
+    let tendons = core.tendons().len();
+    if !matches!(array.shape(), [rows, columns] if row < *rows && *columns == tendons) {
+        let expected = format!("shape (B, {tendons}) with a row {row}");
+        return Err(wrong_shape("displacements", &expected, array.shape()));
     }
+    let around = Surroundings::new(py, Some(obstacles), loads)?;
+    let chained = |forward: &Forward<'_>| forward.chained_shape(flat, row);
+    let shape = run(py, around.prepare(core, settings)?, Some(&around), chained)?;
+    let displacements = flat[row * tendons..(row + 1) * tendons].to_vec();
+    Ok(Shape::new(robot.get().clone(), settings, Solution { displacements, shape }).among(around))
 }
 
-fn export<'py>(py: Python<'py>, batch: &Batch<'_>, solved: Solved) -> PyResult<Bound<'py, PyDict>> {
-    let &Batch { displacements, rows, tendons, fields, .. } = batch;
+fn export<'py>(
+    py: Python<'py>,
+    wanted: &Rows<'_>,
+    tendons: usize,
+    solved: Solved,
+) -> PyResult<Bound<'py, PyDict>> {
+    let &Rows { displacements, count: rows, fields, .. } = wanted;
+    // Fields that are there even without rows.
     let answer = PyDict::new(py);
     answer.set_item("displacements", frozen(py, displacements.to_vec(), &[rows, tendons])?)?;
     if fields.contains(&Field::Contacts) {
@@ -145,6 +119,7 @@ fn export<'py>(py: Python<'py>, batch: &Batch<'_>, solved: Solved) -> PyResult<B
     if fields.contains(&Field::TendonPoints) {
         answer.set_item(Field::TendonPoints.as_str(), PyList::empty(py))?;
     }
+    // Columns of the models, tendon points by tendon.
     for column in solved.columns {
         let shape: Vec<usize> = std::iter::once(rows).chain(column.shape).collect();
         let array = frozen(py, column.values, &shape)?;
@@ -158,16 +133,14 @@ fn export<'py>(py: Python<'py>, batch: &Batch<'_>, solved: Solved) -> PyResult<B
             _ => answer.set_item(name, array)?,
         }
     }
-    let mut statuses = Vec::with_capacity(rows);
-    for report in &solved.reports {
-        statuses.push(status(py, report.status)?.unbind());
-    }
-    answer.set_item("status", frozen(py, statuses, &[rows])?)?;
-    let ok = solved.reports.iter().map(|r| r.status == Status::Converged).collect();
+    // Report of every row.
+    let reports = &solved.reports;
+    answer.set_item("status", frozen_statuses(py, reports.iter().map(|r| r.status))?)?;
+    let ok = reports.iter().map(|r| r.status == Status::Converged).collect();
     answer.set_item("ok", frozen::<bool>(py, ok, &[rows])?)?;
-    let residual = solved.reports.iter().map(|r| r.residual).collect();
+    let residual = reports.iter().map(|r| r.residual).collect();
     answer.set_item("residual", frozen::<f64>(py, residual, &[rows])?)?;
-    let iterations = solved.reports.iter().map(|r| r.iterations as u64).collect();
+    let iterations = reports.iter().map(|r| r.iterations as u64).collect();
     answer.set_item("iterations", frozen::<u64>(py, iterations, &[rows])?)?;
     Ok(answer)
 }

@@ -3,16 +3,12 @@
 use nalgebra::Matrix6xX;
 use pyo3::prelude::*;
 
-use tdcr::constant_curvature::{self, ConstantCurvature};
-use tdcr::model::Model;
-use tdcr::rod::Scratch;
-use tdcr::{InvalidInput, Status};
+use tdcr::forward::{Forward, Solution};
 
 use crate::convert::arrays::{frozen, invalid};
-use crate::forward::model_choice::{Choice, rod_only};
-use crate::forward::one_row;
-use crate::forward::rod;
+use crate::forward::model_choice::model_settings;
 use crate::forward::shape::Shape;
+use crate::forward::{one_row, run, start_state};
 use crate::robot::Robot;
 
 /// Velocity of the tool point per metre of tendon displacement.
@@ -38,8 +34,8 @@ use crate::robot::Robot;
 ///     rod that is just as long as it may be, without tension, is followed on its pulled side, where it
 ///     moves the tip: so are all tendons at rest, held at 0. That holds for changes that leave all of
 ///     these under tension, not for one that lets some go slack: free (`inf`) those. Where taut
-///     tendons depend on each other (three on one inextensible segment) no displacement can change alone: the columns are then those
-///     of the nearest change that the rod can follow.
+///     tendons depend on each other (three on one inextensible segment) no displacement can change
+///     alone: the columns are then those of the nearest change that the rod can follow.
 ///
 /// Raises
 /// ------
@@ -58,47 +54,22 @@ pub(crate) fn jacobian(
     settings: Option<&Bound<'_, PyAny>>,
     start: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Py<PyAny>> {
-    let choice = Choice::new(model, settings)?;
+    let settings = model_settings(model, settings)?;
+    settings.check_derivatives().map_err(|e| invalid(&e))?;
     let displacements = one_row(robot, displacements)?;
-    let solved = robot.get();
-    solved.0.check_displacements(&displacements).map_err(|e| invalid(&e))?;
-    let matrix = match choice {
-        Choice::Rod(settings) => {
-            let start = start.map(|start| rod::start(&solved.0, &settings, start)).transpose()?;
-            let plan = solved.rod_plan(settings).map_err(|e| invalid(&e))?;
-            let columns = rod::run(py, &solved.0, &plan, |rod| {
-                let mut work = Scratch::default();
-                let report = match start {
-                    Some(start) => rod.solve_from(&start, &displacements, &mut work)?,
-                    None => rod.solve(&displacements, &mut work)?,
-                };
-                if report.status == Status::Converged {
-                    let sensitivity = rod.sensitivity(&displacements, &work);
-                    return Ok(Ok(sensitivity.jacobian(solved.0.tool())));
-                }
-                Ok(Err(rod.result(&displacements, report, work)))
-            })?;
-            match columns.map_err(|e| invalid(&e))? {
-                Ok(matrix) => matrix,
-                Err(shape) => {
-                    let shape = Shape::new(solved.clone(), choice, displacements, shape);
-                    return Err(Shape::not_converged(&Bound::new(py, shape)?));
-                }
-            }
+    let core = &robot.get().0;
+    let start = start.map(|start| start_state(core, &settings, start)).transpose()?;
+    let forward = Forward::new(core, settings).map_err(|e| invalid(&e))?;
+    let columns =
+        run(py, forward, None, |forward| forward.jacobian(&displacements, start.as_ref()))?;
+    match columns {
+        Ok(matrix) => frozen_columns(py, &matrix),
+        Err(shape) => {
+            let shape =
+                Shape::new(robot.get().clone(), settings, Solution { displacements, shape });
+            Err(Shape::not_converged(&Bound::new(py, shape)?))
         }
-        Choice::Linkage(_) => {
-            let expected = "a model with derivatives (\"rod\" or \"constant_curvature\")";
-            return Err(invalid(&InvalidInput::new("model", expected, format!("\"{model}\""))));
-        }
-        Choice::ConstantCurvature(_) if start.is_some() => return Err(rod_only("start", model)),
-        Choice::ConstantCurvature(settings) => {
-            let plan = solved.constant_curvature_plan(settings).map_err(|e| invalid(&e))?;
-            ConstantCurvature::new(&solved.0, plan)
-                .jacobian(&displacements, &mut constant_curvature::Scratch::default())
-                .map_err(|e| invalid(&e))?
-        }
-    };
-    frozen_columns(py, &matrix)
+    }
 }
 
 /// Six rows as a read-only (6, K) array.

@@ -3,25 +3,26 @@
 pub(crate) mod batch;
 pub(crate) mod jacobian;
 pub(crate) mod model_choice;
-pub(crate) mod rod;
 pub(crate) mod sensitivity;
 pub(crate) mod shape;
+pub(crate) mod shape_arrays;
 pub(crate) mod shape_parts;
 
 use numpy::PyUntypedArrayMethods;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use tdcr::InvalidInput;
-use tdcr::constant_curvature::ConstantCurvature;
-use tdcr::linkage::Linkage;
-use tdcr::model::Model;
+use tdcr::forward::{Forward, Load, ModelSettings};
+use tdcr::model::{State, rod_only};
+use tdcr::robot as core;
 
-use crate::convert::arrays::{float_array, invalid, values, wrong_shape};
-use crate::forward::model_choice::{Choice, not_around, rod_only};
-use crate::forward::rod::Load;
+use crate::convert::arrays::{float_array, invalid, type_name, values, wrong_shape};
+use crate::convert::interruptible;
+use crate::forward::model_choice::model_settings;
 use crate::forward::shape::Shape;
 use crate::robot::Robot;
-use crate::scene::{self, Surroundings};
+use crate::scene::{Surroundings, raise_fault};
 
 /// From tendon displacements, or tensions, to the shape.
 ///
@@ -71,7 +72,8 @@ use crate::scene::{self, Surroundings};
 ///     Both or neither of displacements and tensions, NaN, -inf, another number of values than
 ///     tendons, a (B, K) array, a negative or infinite tension, tensions, obstacles, loads or a start for
 ///     another model than the rod, proportional tendons with tensions, obstacles or loads, loads without
-///     Young's modulus or with another number of `disk_forces` than disks, a start of another robot, model or number of elements, an unknown model, settings of
+///     Young's modulus or with another number of `disk_forces` than disks, a start of another robot,
+///     model or number of elements, an unknown model, settings of
 ///     another model, axial strain or elastic tendons without Young's modulus; in the models that take
 ///     no others a pre-bent backbone, a routing, two linkage tendons on one azimuth.
 /// TypeError
@@ -96,49 +98,35 @@ pub(crate) fn forward(
     settings: Option<&Bound<'_, PyAny>>,
     start: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Shape> {
-    let choice = Choice::new(model, settings)?;
+    let settings = model_settings(model, settings)?;
     let around = Surroundings::new(py, obstacles, loads)?;
     let load = load(robot, displacements, tensions)?;
-    let solved = robot.get();
-    let core = &solved.0;
-    let (displacements, shape) = match (choice, load) {
-        (Choice::Rod(settings), load) => {
-            if let (Load::Tensions(_), Some(_)) = (&load, start) {
-                let expected = "none beside tensions, which are reached from rest";
-                return Err(invalid(&InvalidInput::new("start", expected, "one")));
-            }
-            let start = start.map(|start| rod::start(core, &settings, start)).transpose()?;
-            let plan = solved.rod_plan(settings).map_err(|e| invalid(&e))?;
-            match (around.any(), load) {
-                (None, load) => rod::run(py, core, &plan, |rod| rod::solve(rod, load, start))?,
-                (Some(_), load) => {
-                    let scene = around.scene(core, &plan, &settings).map_err(|e| invalid(&e))?;
-                    let solve = |rod: &scene::Watched<'_>| rod.solve_load(load, start);
-                    Ok(scene::solve(py, core, &plan, &scene, solve)?)
-                }
-            }
-        }
-        _ if around.any().is_some() => return Err(not_around(&around, model)),
-        (_, Load::Tensions(_)) => return Err(rod_only("tensions", model)),
-        _ if start.is_some() => return Err(rod_only("start", model)),
-        (Choice::Linkage(settings), Load::Displacements(displacements)) => py.detach(|| {
-            let linkage = Linkage::new(core, solved.linkage_plan()?, settings)?;
-            let shape = linkage.shape(&displacements)?;
-            Ok((displacements, shape))
-        }),
-        (Choice::ConstantCurvature(settings), Load::Displacements(displacements)) => {
-            py.detach(|| {
-                let plan = solved.constant_curvature_plan(settings)?;
-                let shape = ConstantCurvature::new(core, plan).shape(&displacements)?;
-                Ok((displacements, shape))
-            })
-        }
-    }
-    .map_err(|e| invalid(&e))?;
-    Ok(Shape::new(solved.clone(), choice, displacements, shape).among(around))
+    let core = &robot.get().0;
+    let start = start.map(|start| start_state(core, &settings, start)).transpose()?;
+    let solve = |forward: &Forward<'_>| forward.solve(load, start.as_ref());
+    let solution = run(py, around.prepare(core, settings)?, Some(&around), solve)?;
+    Ok(Shape::new(robot.get().clone(), settings, solution).among(around))
 }
 
-/// What is given: displacements or tensions, not both.
+/// Runs solves without the GIL, where Ctrl-C can stop them if they may take long. Functions of obstacles take the
+/// GIL and see Ctrl-C themselves; what one of them raises is raised here.
+pub(crate) fn run<T: Send>(
+    py: Python<'_>,
+    forward: Forward<'_>,
+    around: Option<&Surroundings>,
+    job: impl FnOnce(&Forward<'_>) -> Result<T, InvalidInput> + Send,
+) -> PyResult<T> {
+    let listens = around.is_some_and(Surroundings::calls_functions);
+    let microseconds = if listens { 0.0 } else { forward.estimated_microseconds() };
+    let (answer, fault) = interruptible::run_if_long(py, microseconds, |control| {
+        let forward = forward.stopped_by(&control.stop);
+        (job(&forward), forward.take_fault())
+    })?;
+    raise_fault(py, fault)?;
+    answer.map_err(|e| invalid(&e))
+}
+
+/// Displacements or tensions, whichever is given.
 fn load(
     robot: &Bound<'_, Robot>,
     displacements: Option<&Bound<'_, PyAny>>,
@@ -183,4 +171,36 @@ fn one_tension_each(robot: &Bound<'_, Robot>, tensions: &Bound<'_, PyAny>) -> Py
     }
     // Adding 0.0 turns -0.0 into 0.0.
     Ok(values(&array)?.iter().map(|tension| tension + 0.0).collect())
+}
+
+/// Solved quantities of a shape that a solve may start from.
+pub(crate) fn start_state(
+    robot: &core::Robot,
+    settings: &ModelSettings,
+    value: &Bound<'_, PyAny>,
+) -> PyResult<State> {
+    let ModelSettings::Rod(settings) = settings else {
+        return Err(invalid(&rod_only("start", settings.model())));
+    };
+    let Ok(shape) = value.cast::<Shape>() else {
+        let message = format!("start: expected a Shape, got {}", type_name(value));
+        return Err(PyTypeError::new_err(message));
+    };
+    let shape = shape.get();
+    let refuse =
+        |expected: String, got: String| Err(invalid(&InvalidInput::new("start", expected, got)));
+    if shape.model() != "rod" {
+        let got = format!("one of model \"{}\"", shape.model());
+        return refuse("a shape of model \"rod\"".to_owned(), got);
+    }
+    if shape.core_robot() != robot {
+        return refuse("a shape of this robot".to_owned(), "one of another robot".to_owned());
+    }
+    let state = shape.state();
+    let (subsegments, rows) = (robot.backbone().subsegments(), state.strains.len());
+    if rows != subsegments * settings.elements {
+        let expected = format!("a shape with elements={}", settings.elements);
+        return refuse(expected, format!("one with elements={}", rows / subsegments));
+    }
+    Ok(state.clone())
 }

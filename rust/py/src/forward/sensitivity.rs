@@ -10,7 +10,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
 use tdcr::InvalidInput;
-use tdcr::rod::{self as core, Linearized, Plan, Rod, Scratch};
+use tdcr::forward::{Forward, ModelSettings, Plan};
+use tdcr::rod::{self as core, Linearized, Rod};
 
 use crate::convert::arguments::number;
 use crate::convert::arrays::{
@@ -18,8 +19,7 @@ use crate::convert::arrays::{
 };
 use crate::convert::python_side;
 use crate::forward::jacobian::frozen_columns;
-use crate::forward::model_choice::Choice;
-use crate::forward::rod;
+use crate::forward::run;
 use crate::forward::shape::Shape;
 use crate::scene::Surroundings;
 
@@ -62,7 +62,7 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
         return Err(PyTypeError::new_err(message));
     };
     let own = shape.get();
-    let Choice::Rod(settings) = own.choice() else {
+    let ModelSettings::Rod(settings) = own.model_settings() else {
         let got = format!("one of model \"{}\"", own.model());
         return Err(invalid(&InvalidInput::new("shape", "a shape of model \"rod\"", got)));
     };
@@ -73,14 +73,11 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
     if !own.ok() {
         return Err(Shape::not_converged(shape));
     }
-    let plan = own.kept_robot().rod_plan(settings).map_err(|e| invalid(&e))?;
-    let at = rod::run(py, own.core_robot(), &plan, |rod| {
-        let mut work = Scratch::default();
-        // Nothing is left to do there, but for factors and equations.
-        rod.solve_from(own.state(), own.given(), &mut work)?;
-        Ok(rod.sensitivity(own.given(), &work).linearized())
+    let plan = Plan::rod(own.core_robot(), settings).map_err(|e| invalid(&e))?;
+    let forward = Forward::new(own.core_robot(), own.model_settings()).map_err(|e| invalid(&e))?;
+    let at = run(py, forward, None, |forward| {
+        forward.linearize(own.state(), own.displacement_values())
     })?;
-    let at = at.map_err(|e: InvalidInput| invalid(&e))?;
     Ok(Sensitivity { shape: shape.clone().unbind(), plan, at })
 }
 
@@ -89,11 +86,12 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
 /// Tendons under tension count, and those that are just as long as they may be: the latter are followed on
 /// their pulled side, at rest for instance, for changes that let none of them go slack. Free and slack ones
 /// do not. Where tendons that count depend on each other (`dependent`), displacements cannot change one by
-/// one: derivatives are then those of the nearest change that the rod can follow. With proportional tendons, tensions are those of the base pieces.
+/// one: derivatives are then those of the nearest change that the rod can follow. With proportional tendons,
+/// tensions are those of the base pieces.
 #[pyclass(frozen, eq, module = "tdcr")]
 pub(crate) struct Sensitivity {
     shape: Py<Shape>,
-    plan: Arc<Plan>,
+    plan: Arc<core::Plan>,
     at: Arc<Linearized>,
 }
 
@@ -122,7 +120,7 @@ impl Sensitivity {
         self.shape.clone_ref(py)
     }
 
-    /// Whether tendons that count depend on each other: three on one inextensible segment, tendons that
+    /// True if tendons that count depend on each other: three on one inextensible segment, tendons that
     /// share all holes.
     #[getter]
     fn dependent(&self) -> bool {
@@ -139,7 +137,7 @@ impl Sensitivity {
         frozen_columns(py, &py.detach(|| self.core().jacobian(self.robot().tool())))
     }
 
-    /// What a change of everything at once does to the shape, to first order.
+    /// First-order effect of a change of everything at once on the shape.
     ///
     /// Parameters
     /// ----------

@@ -6,12 +6,14 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple, PyType};
 
 use tdcr::Status;
+use tdcr::forward::{ModelSettings, Solution};
 use tdcr::lie::Pose;
 use tdcr::model::State;
 
-use crate::convert::arrays::{Lazy, frozen, frozen_frames, frozen_points, status};
+use crate::convert::arrays::{frozen, status};
 use crate::convert::python_side;
-use crate::forward::model_choice::Choice;
+use crate::forward::model_choice::python_settings;
+use crate::forward::shape_arrays::ShapeArrays;
 use crate::robot::Robot;
 use crate::scene::Surroundings;
 use crate::scene::contact::Contact;
@@ -23,37 +25,24 @@ use crate::scene::loads::Loads;
 #[pyclass(frozen, module = "tdcr")]
 pub(crate) struct Shape {
     robot: Robot,
-    choice: Choice,
+    settings: ModelSettings,
     displacements: Vec<f64>,
     core: tdcr::Shape,
     /// None where there is nothing.
     around: Option<Surroundings>,
-    arrays: Arrays,
-}
-
-#[derive(Default)]
-struct Arrays {
-    frames: Lazy,
-    positions: Lazy,
-    tip: Lazy,
-    strains: Lazy,
-    tendon_points: Lazy,
-    tendon_lengths: Lazy,
-    tensions: Lazy,
-    displacements: Lazy,
+    arrays: ShapeArrays,
 }
 
 impl Shape {
     pub(crate) fn new(
         robot: Robot,
-        choice: Choice,
-        displacements: Vec<f64>,
-        core: tdcr::Shape,
+        settings: ModelSettings,
+        Solution { displacements, shape: core }: Solution,
     ) -> Self {
-        Self { robot, choice, displacements, core, around: None, arrays: Arrays::default() }
+        Self { robot, settings, displacements, core, around: None, arrays: ShapeArrays::default() }
     }
 
-    /// The same, solved among obstacles and under loads.
+    /// This shape, solved among obstacles and under loads.
     pub(crate) fn among(self, around: Surroundings) -> Self {
         Self { around: around.any().is_some().then_some(around), ..self }
     }
@@ -62,16 +51,12 @@ impl Shape {
         self.around.as_ref()
     }
 
-    pub(crate) const fn choice(&self) -> Choice {
-        self.choice
+    pub(crate) const fn model_settings(&self) -> ModelSettings {
+        self.settings
     }
 
-    pub(crate) fn given(&self) -> &[f64] {
+    pub(crate) fn displacement_values(&self) -> &[f64] {
         &self.displacements
-    }
-
-    pub(crate) fn kept_robot(&self) -> &Robot {
-        &self.robot
     }
 
     /// The exception that has it as its result.
@@ -102,7 +87,7 @@ impl Shape {
     pub(crate) fn same(&self, other: &Self) -> bool {
         let (a, b) = (&self.core, &other.core);
         self.robot == other.robot
-            && self.choice == other.choice
+            && self.settings == other.settings
             && same_bits(&self.displacements, &other.displacements)
             && a.state.frames == b.state.frames
             && a.state.strains == b.state.strains
@@ -124,45 +109,38 @@ impl Shape {
     /// Name of the model that solved it.
     #[getter]
     pub(crate) fn model(&self) -> &'static str {
-        self.choice.model()
+        self.settings.model()
     }
 
     /// The settings it was solved with: RodSettings, LinkageSettings or ConstantCurvatureSettings.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.choice.settings(py)
+        python_settings(py, self.settings)
     }
 
     /// Tendon displacements, shape (K,) [m]: negative pulls, `inf` is free. Of a shape under given
     /// tensions, those that lead to it.
     #[getter]
     fn displacements(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let build = || frozen(py, self.displacements.clone(), &[self.displacements.len()]);
-        self.arrays.displacements.get(py, build)
+        self.arrays.displacements(py, &self.displacements)
     }
 
     /// Frame of every disk, shape (n + 1, 4, 4).
     #[getter]
     fn frames(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let build = || frozen_frames(py, &self.core.state.frames);
-        self.arrays.frames.get(py, build)
+        self.arrays.frames(py, self.state())
     }
 
     /// Centre of every disk, shape (n + 1, 3) [m].
     #[getter]
     fn positions(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let build = || frozen_points(py, self.core.state.frames.iter().map(|f| f.translation));
-        self.arrays.positions.get(py, build)
+        self.arrays.positions(py, self.state())
     }
 
     /// Frame of the tip disk, shape (4, 4).
     #[getter]
     fn tip(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let build = || {
-            let tip = self.core.state.frames.last().copied().unwrap_or_else(Pose::identity);
-            frozen(py, tip.to_row_major().to_vec(), &[4, 4])
-        };
-        self.arrays.tip.get(py, build)
+        self.arrays.tip(py, self.state())
     }
 
     /// Rotation vector of every element in the frame of its own base (bending about x and y,
@@ -170,47 +148,29 @@ impl Shape {
     /// models. A rod of m elements per subsegment has n m rows, base first.
     #[getter]
     fn strains(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let build = || {
-            let state = &self.core.state;
-            let width = if state.elongations.is_empty() { 3 } else { 4 };
-            let mut flat = vec![0.0; width * state.strains.len()];
-            state.write_strains(&mut flat);
-            frozen(py, flat, &[state.strains.len(), width])
-        };
-        self.arrays.strains.get(py, build)
+        self.arrays.strains(py, self.state())
     }
 
     /// Places of every tendon's holes: list of K arrays of shape (end + 1, 3) [m].
     #[getter]
     fn tendon_points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let arrays = self.arrays.tendon_points.get(py, || {
-            let points = (self.robot.0.paths().iter())
-                .map(|path| frozen_points(py, path.points(&self.core.state.frames)));
-            let points = points.collect::<PyResult<Vec<_>>>()?;
-            Ok(PyTuple::new(py, points)?.into_any().unbind())
-        })?;
-        // A list of its own for every caller; the arrays are shared and read-only.
-        arrays.bind(py).cast::<PyTuple>()?.as_sequence().to_list()
+        self.arrays.tendon_points(py, &self.robot.0, self.state())
     }
 
     /// Length of every tendon from the base to its end, shape (K,) [m].
     #[getter]
     fn tendon_lengths(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let lengths = &self.core.state.tendon_lengths;
-        let build = || frozen(py, lengths.clone(), &[lengths.len()]);
-        self.arrays.tendon_lengths.get(py, build)
+        self.arrays.tendon_lengths(py, self.state())
     }
 
     /// Tension of every tendon, shape (K,) [N, or 1/m^2 when `units` is "EI"], 0 where it is slack or
     /// free. NaN in the linkage and the constant-curvature model, which know no forces.
     #[getter]
     fn tensions(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let tensions = &self.core.state.tensions;
-        let build = || frozen(py, tensions.clone(), &[tensions.len()]);
-        self.arrays.tensions.get(py, build)
+        self.arrays.tensions(py, self.state())
     }
 
-    /// Where it touches obstacles: list of Contact, base first.
+    /// Contacts with obstacles: list of Contact, base first.
     #[getter]
     fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         PyList::new(py, self.core.state.contacts.iter().map(|contact| Contact(*contact)))
@@ -235,19 +195,19 @@ impl Shape {
         self.core.state.energy
     }
 
-    /// How the solve ended: tdcr.Status.
+    /// Status of the solve: tdcr.Status.
     #[getter]
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         status(py, self.core.report.status)
     }
 
-    /// Whether the solve converged.
+    /// True if the solve converged.
     #[getter]
     pub(crate) fn ok(&self) -> bool {
         self.core.report.status == Status::Converged
     }
 
-    /// What stood in the way, or an empty string.
+    /// Reason of the status, or an empty string.
     #[getter]
     fn message(&self) -> &str {
         &self.core.message
@@ -437,21 +397,4 @@ impl Shape {
         );
         Ok((rebuild, state.into_pyobject(py)?))
     }
-}
-
-/// Rotation vector of a frame's rotation, for tables.
-///
-/// Parameters
-/// ----------
-/// frame : array_like, shape (4, 4)
-///
-/// Returns
-/// -------
-/// tuple of float
-///     Axis times angle [rad], of length 0 to pi.
-#[pyfunction]
-pub(crate) fn _rotation_vector(frame: &Bound<'_, PyAny>) -> PyResult<(f64, f64, f64)> {
-    let matrix = crate::convert::arrays::matrix4("frame", frame)?;
-    let vector = tdcr::lie::so3::log(&matrix.fixed_view::<3, 3>(0, 0).into_owned());
-    Ok((vector.x, vector.y, vector.z))
 }

@@ -1,15 +1,16 @@
-//! A `Shape` made again from its parts, as pickle and files keep them.
+//! Parts of a `Shape`, as pickle, files and tables keep them.
 
 use nalgebra::{Matrix3, Vector3};
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
 use tdcr::Status;
+use tdcr::forward::Solution;
 use tdcr::lie::Pose;
 use tdcr::model::{Report, State};
 
-use crate::convert::arrays::{float_array, values, wrong_shape};
-use crate::forward::model_choice::Choice;
+use crate::convert::arrays::{float_array, matrix4, values, wrong_shape};
+use crate::forward::model_choice::model_settings;
 use crate::forward::shape::Shape;
 use crate::robot::Robot;
 use crate::scene::Surroundings;
@@ -31,9 +32,11 @@ pub(crate) fn _shape(
     outcome: (String, String, f64, usize),
     around: (Bound<'_, PyAny>, Option<Bound<'_, PyAny>>, Vec<Bound<'_, Contact>>),
 ) -> PyResult<Shape> {
+    // Numbers of tendons.
     let list = |name: &str, value: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
         Ok(values(&float_array(name, value)?)?.to_vec())
     };
+    // Frames of the disks.
     let frames = float_array("frames", frames)?;
     if frames.shape().len() != 3 || frames.shape()[1..] != [4, 4] {
         return Err(wrong_shape("frames", "shape (n + 1, 4, 4)", frames.shape()));
@@ -44,12 +47,14 @@ pub(crate) fn _shape(
             translation: Vector3::new(m[3], m[7], m[11]),
         })
         .collect();
+    // Strains of the elements, with their elongations where the rod has them.
     let strains = float_array("strains", strains)?;
     let width = match strains.shape() {
         [_, width @ (3 | 4)] => *width,
         shape => return Err(wrong_shape("strains", "shape (n, 3 or 4)", shape)),
     };
     let rows = values(&strains)?.chunks_exact(width);
+    // Obstacles, loads and contacts.
     let (obstacles, loads, contacts) = around;
     let around = Surroundings::new(robot.py(), Some(&obstacles), loads.as_ref())?;
     let state = State {
@@ -61,18 +66,19 @@ pub(crate) fn _shape(
         tensions: list("tensions", tensions)?,
         energy,
     };
+    // Status of the solve.
     let (name, message, residual, iterations) = outcome;
     let known = Status::ALL.into_iter().find(|status| status.as_str() == name);
     let status = known.unwrap_or(Status::NumericalError);
-    let core = tdcr::Shape { state, report: Report { status, residual, iterations }, message };
-    let choice = Choice::new(model, Some(settings))?;
+    let shape = tdcr::Shape { state, report: Report { status, residual, iterations }, message };
+    let settings = model_settings(model, Some(settings))?;
     let displacements = list("displacements", displacements)?;
-    fits(&robot.get().0, &core.state, &displacements)?;
-    Ok(Shape::new(robot.get().clone(), choice, displacements, core).among(around))
+    check_sizes(&robot.get().0, &shape.state, &displacements)?;
+    Ok(Shape::new(robot.get().clone(), settings, Solution { displacements, shape }).among(around))
 }
 
 /// Refuses a state that is not one of the robot: its tendons' holes are looked up by disk.
-fn fits(robot: &tdcr::robot::Robot, state: &State, displacements: &[f64]) -> PyResult<()> {
+fn check_sizes(robot: &tdcr::robot::Robot, state: &State, displacements: &[f64]) -> PyResult<()> {
     let (disks, tendons) = (robot.backbone().subsegments() + 1, robot.paths().len());
     for (name, expected, got) in [
         ("frames", disks, state.frames.len()),
@@ -86,4 +92,21 @@ fn fits(robot: &tdcr::robot::Robot, state: &State, displacements: &[f64]) -> PyR
         }
     }
     Ok(())
+}
+
+/// Rotation vector of a frame's rotation, for tables.
+///
+/// Parameters
+/// ----------
+/// frame : array_like, shape (4, 4)
+///
+/// Returns
+/// -------
+/// tuple of float
+///     Axis times angle [rad], of length 0 to pi.
+#[pyfunction]
+pub(crate) fn _rotation_vector(frame: &Bound<'_, PyAny>) -> PyResult<(f64, f64, f64)> {
+    let matrix = matrix4("frame", frame)?;
+    let vector = tdcr::lie::so3::log(&matrix.fixed_view::<3, 3>(0, 0).into_owned());
+    Ok((vector.x, vector.y, vector.z))
 }

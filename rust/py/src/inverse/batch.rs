@@ -1,7 +1,5 @@
 //! The engine of `inverse_batch` and `track`; their docstrings are in Python.
 
-use std::sync::Mutex;
-
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -12,12 +10,12 @@ use tdcr::inverse::{Answer, InverseRows, Inverter, Target, invert_path, invert_r
 use tdcr::{InvalidInput, Status};
 
 use crate::convert::arguments::{optional, whole};
-use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
+use crate::convert::arrays::{float_array, frozen, frozen_statuses, invalid, values, wrong_shape};
 use crate::convert::interruptible;
 use crate::inverse::targets::many_targets;
 use crate::inverse::{Engine, Plans, one_start};
 use crate::robot::Robot;
-use crate::scene::{Surroundings, checked};
+use crate::scene::{Surroundings, raise_fault};
 use crate::settings::inverse::InverseSettings;
 
 /// Columns of many inverses, each alone (`chain` false) or from the answer of the one before.
@@ -58,7 +56,7 @@ pub(crate) fn _inverse_batch<'py>(
         }
         Engine::Rod(inverse) => {
             let rows = invert_many(py, &**inverse, &targets, start, pool, progress, &around)?;
-            checked(py, Mutex::new(inverse.take_fault()))?;
+            raise_fault(py, inverse.take_fault())?;
             Ok(rows)
         }
     }
@@ -99,11 +97,7 @@ fn export(py: Python<'_>, rows: InverseRows, tendons: usize) -> PyResult<Bound<'
     let columns = PyDict::new(py);
     columns.set_item("displacements", frozen(py, displacements, &[answers.len(), tendons])?)?;
     columns.set_item("tensions", frozen(py, tensions, &[answers.len(), tendons])?)?;
-    let mut statuses = Vec::with_capacity(answers.len());
-    for answer in &answers {
-        statuses.push(status(py, answer.status)?.unbind());
-    }
-    columns.set_item("status", frozen(py, statuses, &count)?)?;
+    columns.set_item("status", frozen_statuses(py, answers.iter().map(|a| a.status))?)?;
     let floats = |column: fn(&Answer) -> f64| answers.iter().map(column).collect::<Vec<f64>>();
     columns.set_item("error", frozen(py, floats(|a| a.distance), &count)?)?;
     columns.set_item("rotation_error", frozen(py, floats(|a| a.angle), &count)?)?;

@@ -4,49 +4,48 @@ pub(crate) mod batch;
 pub(crate) mod cartesian_path;
 pub(crate) mod targets;
 
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
+use tdcr::forward::{Forward, Load, ModelSettings, Plan};
 use tdcr::inverse::{
-    Answer, ConstantCurvatureInverse, Inverter, Method, PositionsAnswer, RodInverse, Target,
+    Answer, ConstantCurvatureInverse, Inversion, Inverter, Method, RodInverse, invert,
 };
-use tdcr::model::State;
+use tdcr::model::rod_only;
 use tdcr::rod::contact::Scene;
 use tdcr::{InvalidInput, constant_curvature, rod};
 
 use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
 use crate::convert::interruptible;
-use crate::forward::model_choice::{Choice, rod_only};
-use crate::forward::rod::Load;
+use crate::forward::model_choice::model_settings;
+use crate::forward::run;
 use crate::forward::shape::Shape;
 use crate::inverse::targets::one_target;
 use crate::robot::Robot;
-use crate::scene::{self, Surroundings, Watched, checked};
+use crate::scene::{Surroundings, raise_fault};
 use crate::settings::bounds::Bounds;
 use crate::settings::inverse::InverseSettings;
 
-/// Steps and evaluations, of a few tenths of a microsecond each, up to which a single inverse ends soon
-/// enough to go without listening for Ctrl-C.
-const SOON: usize = 200_000;
+/// Time of a step or an evaluation of arcs \[µs\].
+const MICROSECONDS_PER_ARC_STEP: f64 = 0.25;
 
-/// How many times as long those of the rod take.
-const ROD: usize = 100;
+/// Time of a step or an evaluation of a rod \[µs\].
+const MICROSECONDS_PER_ROD_STEP: f64 = 25.0;
 
-/// Whether it does, by what a step takes.
-fn soon(search: &tdcr::inverse::InverseSettings, each: usize) -> bool {
+/// Estimated time of a single inverse that uses all its starts and steps \[µs\].
+fn estimated_microseconds(search: &tdcr::inverse::InverseSettings, per_step: f64) -> f64 {
     let starts = if search.method == Method::Swarm { search.starts } else { 1 };
-    let swarms = search.swarm.particles.saturating_mul(search.swarm.max_iterations);
-    let steps = search.starts.saturating_mul(search.max_iterations);
-    steps.saturating_add(swarms.saturating_mul(starts)).saturating_mul(each) <= SOON
+    let swarms = search.swarm.particles as f64 * search.swarm.max_iterations as f64;
+    let steps = search.starts as f64 * search.max_iterations as f64;
+    (steps + swarms * starts as f64) * per_step
 }
 
 /// The model's knowledge of a robot, which an inverse refers to.
-pub(crate) enum Plans<'a> {
-    Arcs(&'a constant_curvature::Plan),
+pub(crate) enum Plans {
+    Arcs(Arc<constant_curvature::Plan>),
     Rod(Arc<rod::Plan>, Option<Scene>),
 }
 
@@ -56,28 +55,25 @@ pub(crate) enum Engine<'a> {
     Rod(Box<RodInverse<'a>>),
 }
 
-impl<'a> Plans<'a> {
+impl Plans {
     pub(crate) fn new(
-        robot: &'a Bound<'_, Robot>,
+        robot: &Bound<'_, Robot>,
         model: &str,
         settings: Option<&Bound<'_, PyAny>>,
         around: &Surroundings,
     ) -> PyResult<Self> {
-        let choice = Choice::new(model, settings)?;
-        match choice {
-            Choice::Rod(_) => {}
-            _ => around.any().map_or(Ok(()), |what| Err(rod_only(what, model)))?,
-        }
-        match choice {
-            Choice::ConstantCurvature(settings) => {
-                robot.get().constant_curvature_plan(settings).map(Self::Arcs)
+        let settings = model_settings(model, settings)?;
+        around.check(&settings)?;
+        let core: &tdcr::robot::Robot = &robot.get().0;
+        match settings {
+            ModelSettings::ConstantCurvature(settings) => {
+                Plan::constant_curvature(core, settings).map(Self::Arcs)
             }
-            Choice::Rod(settings) => robot.get().rod_plan(settings).and_then(|plan| {
-                let core = &robot.get().0;
-                let scene = around.any().map(|_| around.scene(core, &plan, &settings));
-                Ok(Self::Rod(plan, scene.transpose()?))
+            ModelSettings::Rod(settings) => Plan::rod(core, settings).and_then(|plan| {
+                let scene = around.scene(core, &plan)?;
+                Ok(Self::Rod(plan, scene))
             }),
-            Choice::Linkage(_) => {
+            ModelSettings::Linkage(_) => {
                 let expected = "a model with an inverse (\"rod\" or \"constant_curvature\")";
                 Err(InvalidInput::new("model", expected, format!("\"{model}\"")))
             }
@@ -85,7 +81,7 @@ impl<'a> Plans<'a> {
         .map_err(|e| invalid(&e))
     }
 
-    pub(crate) fn engine(
+    pub(crate) fn engine<'a>(
         &'a self,
         robot: &'a Bound<'_, Robot>,
         bounds: Option<&Bound<'_, PyAny>>,
@@ -161,13 +157,14 @@ fn row(
     ))
 }
 
-/// One inverse.
+/// One inverse, for a target or for positions of the disks.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // The keywords of inverse.
 pub(crate) fn _inverse(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
-    target: &Bound<'_, PyAny>,
+    target: Option<&Bound<'_, PyAny>>,
+    positions: Option<&Bound<'_, PyAny>>,
     model: &str,
     start: Option<&Bound<'_, PyAny>>,
     bounds: Option<&Bound<'_, PyAny>>,
@@ -180,40 +177,49 @@ pub(crate) fn _inverse(
     let around = Surroundings::new(py, Some(obstacles), loads)?;
     let plans = Plans::new(robot, model, settings, &around)?;
     let engine = plans.engine(robot, bounds, search, method)?;
-    let target = one_target(target)?;
-    let found = match &engine {
-        Engine::Arcs(inverse) => {
-            let soon = soon(inverse.settings(), 1);
-            invert_one(py, &**inverse, &target, start, &around, soon)?
+    let found = match (&engine, positions) {
+        (Engine::Arcs(_), Some(_)) => return Err(invalid(&rod_only("positions", model))),
+        (Engine::Arcs(inverse), None) => {
+            let time = estimated_microseconds(inverse.settings(), MICROSECONDS_PER_ARC_STEP);
+            invert_one(py, &**inverse, target, start, &around, time)?
         }
-        Engine::Rod(inverse) => {
-            let soon = around.any().is_none() && soon(inverse.settings(), ROD);
+        (Engine::Rod(inverse), positions) => {
+            // Among obstacles there is no bound.
+            let time = match around.any() {
+                None => estimated_microseconds(inverse.settings(), MICROSECONDS_PER_ROD_STEP),
+                Some(_) => f64::INFINITY,
+            };
             // First: an interrupt stops the functions of obstacles too.
-            let found = invert_one(py, &**inverse, &target, start, &around, soon)?;
-            checked(py, Mutex::new(inverse.take_fault()))?;
+            let found = match positions {
+                Some(positions) => invert_positions(py, inverse, positions, start, &around)?,
+                None => invert_one(py, &**inverse, target, start, &around, time)?,
+            };
+            raise_fault(py, inverse.take_fault())?;
             found
         }
     };
-    with_shape(py, robot, &plans, found, Choice::new(model, settings)?, around)
+    let found = found.map_err(|e| invalid(&e))?;
+    with_shape(py, robot, found, model_settings(model, settings)?, around)
 }
 
 /// A row, and the shape found where displacements do not say which it is: solved again from there.
 fn with_shape(
     py: Python<'_>,
     robot: &Bound<'_, Robot>,
-    plans: &Plans<'_>,
-    ((displacements, tensions, answer, message), state): Found,
-    choice: Choice,
+    found: Inversion,
+    settings: ModelSettings,
     around: Surroundings,
 ) -> PyResult<(Row, Option<Shape>)> {
-    let shape = match (state, plans) {
-        (Some(state), Plans::Rod(plan, Some(scene))) => {
+    let Inversion { answer, displacements, tensions, message, state } = found;
+    let shape = match state {
+        Some(state) => {
             let load = Load::Displacements(displacements.clone());
-            let solve = |rod: &Watched<'_>| rod.solve_load(load, Some(state));
-            let (given, shape) = scene::solve(py, &robot.get().0, plan, scene, solve)?;
-            Some(Shape::new(robot.get().clone(), choice, given, shape).among(around))
+            let solve = |forward: &Forward<'_>| forward.solve(load, Some(&state));
+            let core = &robot.get().0;
+            let solution = run(py, around.prepare(core, settings)?, Some(&around), solve)?;
+            Some(Shape::new(robot.get().clone(), settings, solution).among(around))
         }
-        _ => None,
+        None => None,
     };
     Ok((row(py, displacements, tensions, &answer, message)?, shape))
 }
@@ -248,74 +254,41 @@ fn wanted_places(
     .collect()
 }
 
-/// One inverse for places of the disks.
-#[pyfunction]
-#[allow(clippy::too_many_arguments)] // The keywords of inverse.
-pub(crate) fn _inverse_places(
-    py: Python<'_>,
-    robot: &Bound<'_, Robot>,
-    positions: &Bound<'_, PyAny>,
-    model: &str,
-    start: Option<&Bound<'_, PyAny>>,
-    bounds: Option<&Bound<'_, PyAny>>,
-    settings: Option<&Bound<'_, PyAny>>,
-    search: Option<&Bound<'_, InverseSettings>>,
-    method: &str,
-    obstacles: &Bound<'_, PyAny>,
-    loads: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Row, Option<Shape>)> {
-    let around = Surroundings::new(py, Some(obstacles), loads)?;
-    let plans = Plans::new(robot, model, settings, &around)?;
-    let engine = plans.engine(robot, bounds, search, method)?;
-    let Engine::Rod(inverse) = &engine else { return Err(rod_only("positions", model)) };
-    let places = wanted_places(&robot.get().0, positions)?;
-    let start = one_start(inverse.robot(), start)?;
-    let found = interruptible::run(py, None, |control| {
-        around.stopped_by(&control.stop);
-        let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
-        let start = start.map(begin).transpose()?;
-        inverse.solve_positions(&places, start.as_ref(), Some(&control.stop))
-    })?;
-    checked(py, Mutex::new(inverse.take_fault()))?;
-    let PositionsAnswer { answer, displacements, tensions, message, state } =
-        found.map_err(|e| invalid(&e))?;
-    let found = ((displacements, tensions, answer, message), state);
-    with_shape(py, robot, &plans, found, Choice::new(model, settings)?, around)
-}
-
-/// Displacements, tensions, how it ended and the message, and the shape where displacements do not say which it is.
-type Found = ((Vec<f64>, Vec<f64>, Answer, String), Option<State>);
-
 fn invert_one<I: Inverter>(
     py: Python<'_>,
     inverse: &I,
-    target: &Target,
+    target: Option<&Bound<'_, PyAny>>,
     start: Option<&Bound<'_, PyAny>>,
     around: &Surroundings,
-    soon: bool,
-) -> PyResult<Found> {
-    inverse.check_target(target).map_err(|e| invalid(&e))?;
+    microseconds: f64,
+) -> PyResult<Result<Inversion, InvalidInput>> {
+    let Some(target) = target else {
+        return Ok(Err(InvalidInput::new("target", "a target or positions", "neither")));
+    };
+    let target = one_target(target)?;
+    inverse.check_target(&target).map_err(|e| invalid(&e))?;
     let start = one_start(inverse.robot(), start)?;
-    let solve = |stop: Option<&Arc<AtomicBool>>| {
-        let start = start.map(|own| inverse.start(&own, stop).map_err(of_start)).transpose()?;
-        let mut work = inverse.buffers(stop.map(AsRef::as_ref));
-        let answer = inverse.solve(target, start.as_ref(), &mut work);
-        let mut displacements = vec![f64::NAN; inverse.robot().tendons().len()];
-        let mut tensions = displacements.clone();
-        inverse.write_displacements(&work, &mut displacements);
-        inverse.write_tensions(&work, &mut tensions);
-        let message = inverse.message(&answer, &work);
-        Ok(((displacements, tensions, answer, message), inverse.state(&mut work)))
-    };
-    let found = if soon {
-        py.detach(|| solve(None))
-    } else {
-        interruptible::run(py, None, |control| {
-            around.stopped_by(&control.stop);
-            solve(Some(&control.stop))
-        })?
-    };
-    found.map_err(|e| invalid(&e))
+    interruptible::run_if_long(py, microseconds, |control| {
+        around.stopped_by(&control.stop);
+        invert(inverse, &target, start.as_deref(), Some(&control.stop))
+    })
+}
+
+fn invert_positions(
+    py: Python<'_>,
+    inverse: &RodInverse<'_>,
+    positions: &Bound<'_, PyAny>,
+    start: Option<&Bound<'_, PyAny>>,
+    around: &Surroundings,
+) -> PyResult<Result<Inversion, InvalidInput>> {
+    let positions = wanted_places(inverse.robot(), positions)?;
+    let start = one_start(inverse.robot(), start)?;
+    interruptible::run(py, None, |control| {
+        around.stopped_by(&control.stop);
+        let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
+        let start = start.map(begin).transpose()?;
+        inverse.solve_positions(&positions, start.as_ref(), Some(&control.stop))
+    })
 }
 
 /// All answers of one target, least bending energy first, each with the number of starts that led there.

@@ -1,4 +1,4 @@
-//! Where the tool should be, from Python.
+//! Targets of the tool, from Python.
 
 use nalgebra::{Matrix4, Vector3};
 use numpy::PyUntypedArrayMethods;

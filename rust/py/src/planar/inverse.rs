@@ -1,6 +1,6 @@
 //! The engines of `PlanarTrunk.inverse` and `inverse_batch`; their docstrings are in Python.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use nalgebra::Vector2;
 use numpy::PyUntypedArrayMethods;
@@ -10,21 +10,20 @@ use pyo3::types::PyDict;
 use tdcr::batch::pool;
 use tdcr::planar::{
     Circle, Goal, Inverse, InverseSettings, Row, SwarmInverse, SwarmSettings, SwarmSolver,
-    Unknowns, WatchDecision, inverse, inverse_rows, inverse_until, solve_rows,
+    Unknowns, WatchDecision, inverse_rows, inverse_until, solve_rows,
 };
 use tdcr::{InvalidInput, Status};
 
 use crate::convert::arguments::{OneOrMany, number, optional, text, whole};
-use crate::convert::arrays::{float_array, frozen, invalid, status, values, wrong_shape};
-use crate::convert::interruptible;
+use crate::convert::arrays::{
+    float_array, frozen, frozen_statuses, invalid, status, values, wrong_shape,
+};
+use crate::convert::interruptible::{self, POLL};
 use crate::planar::trunk::{coordinate, pairs, row, trunk};
 use crate::settings::pso::PsoSettings;
 
-/// How often a single search looks at signals.
-const POLL: Duration = Duration::from_millis(50);
-
-/// Newton steps times sections at most, from which on a single call listens for Ctrl-C.
-const LONG: usize = 20_000;
+/// Estimated time of a section in a Newton step \[µs\].
+const MICROSECONDS_PER_SECTION: f64 = 2.5;
 
 fn newton_settings(
     tolerance: &Bound<'_, PyAny>,
@@ -145,13 +144,9 @@ pub(crate) fn _planar_newton<'py>(
     let trunk = trunk(lengths, cable_distance)?;
     let goal = one_goal(x, y, heading, limit)?;
     let settings = newton_settings(tolerance, max_iterations, starts)?;
-    let sections = trunk.lengths().len();
-    let steps = settings.starts.saturating_mul(settings.max_iterations).saturating_mul(sections);
-    if steps < LONG {
-        let found = py.detach(|| inverse(&trunk, &goal, &settings)).map_err(|e| invalid(&e))?;
-        return fields(py, found);
-    }
-    let found = interruptible::run(py, None, |control| {
+    let steps = settings.starts as f64 * settings.max_iterations as f64;
+    let microseconds = steps * trunk.lengths().len() as f64 * MICROSECONDS_PER_SECTION;
+    let found = interruptible::run_if_long(py, microseconds, |control| {
         inverse_until(&trunk, &goal, &settings, &control.stop)
     })?;
     // Stopped only by an exception, which is raised already.
@@ -176,24 +171,27 @@ pub(crate) fn _planar_swarm<'py>(
     let goal = one_goal(x, y, heading, limit)?;
     let circles = circles(&keywords.obstacles)?;
     let settings = keywords.settings()?;
+    // Solve without the GIL: a callback hears of every move, signals get a look every 50 ms.
     let mut solver = SwarmSolver::new(&trunk, &circles, &settings).map_err(|e| invalid(&e))?;
     let mut listener = Listener { callback: callback.map(|c| c.clone().unbind()), fault: None };
     let seed = settings.swarm.seed;
     let found = py.detach(|| {
-        let mut heard = Instant::now();
+        let mut last_poll = Instant::now();
         solver.solve(&goal, seed, &mut |progress| {
-            if listener.callback.is_none() && heard.elapsed() < POLL {
+            if listener.callback.is_none() && last_poll.elapsed() < POLL {
                 return WatchDecision::GoOn;
             }
-            heard = Instant::now();
+            last_poll = Instant::now();
             listener.ask(progress.iteration, progress.value)
         })
     });
+    // An exception of the callback or a signal ends the search.
     if let Some(fault) = listener.fault {
         return Err(fault);
     }
     // Abandoned only with a fault.
     let Some(found) = found.map_err(|e| invalid(&e))? else { return Ok(PyDict::new(py)) };
+    // The inverse, and what the swarms did.
     let SwarmInverse { inverse, clearance, value, history, moves, evaluations, swarms, seed } =
         found;
     let answer = fields(py, inverse)?;
@@ -355,11 +353,7 @@ fn columns<'py>(
     table.set_item("error", frozen(py, floats(|a| a.error), &count)?)?;
     table.set_item("heading_error", frozen(py, floats(|a| a.heading_error), &count)?)?;
     table.set_item("energy", frozen(py, floats(|a| a.energy), &count)?)?;
-    let mut statuses = Vec::with_capacity(answers.len());
-    for answer in answers {
-        statuses.push(status(py, answer.status)?.unbind());
-    }
-    table.set_item("status", frozen(py, statuses, &count)?)?;
+    table.set_item("status", frozen_statuses(py, answers.iter().map(|a| a.status))?)?;
     let counts = |column: fn(&Inverse) -> usize| {
         answers.iter().map(|a| column(a) as u64).collect::<Vec<_>>()
     };

@@ -53,7 +53,7 @@ pub(crate) fn turns(trunk: &Trunk, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64
     Ok(turns)
 }
 
-fn reading(value: &Bound<'_, PyAny>) -> PyResult<Cables> {
+fn cable_kind(value: &Bound<'_, PyAny>) -> PyResult<Cables> {
     let name = text("cables", value)?;
     Cables::ALL.into_iter().find(|known| known.as_str() == name).ok_or_else(|| {
         let got = format!("\"{name}\"");
@@ -103,7 +103,7 @@ pub(crate) fn _planar_turns(
     let trunk = trunk(lengths, cable_distance)?;
     let m = trunk.lengths().len();
     let pairs = pairs("cable_lengths", cable_lengths, &m.to_string())?;
-    let bent = trunk.turns(&pairs, reading(cables)?).map_err(|e| invalid(&e))?;
+    let bent = trunk.turns(&pairs, cable_kind(cables)?).map_err(|e| invalid(&e))?;
     Ok((frozen(py, bent.turns, &[m])?, frozen(py, bent.misfit, &[m])?))
 }
 
@@ -118,7 +118,7 @@ pub(crate) fn _planar_cable_lengths(
 ) -> PyResult<Py<PyAny>> {
     let trunk = trunk(lengths, cable_distance)?;
     let turns = turns(&trunk, given)?;
-    let pairs = trunk.cable_lengths(&turns, reading(cables)?).map_err(|e| invalid(&e))?;
+    let pairs = trunk.cable_lengths(&turns, cable_kind(cables)?).map_err(|e| invalid(&e))?;
     frozen(py, flat(pairs), &[turns.len(), 2])
 }
 

@@ -3,16 +3,13 @@
 pub(crate) mod backbone;
 pub(crate) mod tendon;
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::Arc;
 
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple, PyType};
 
-use tdcr::constant_curvature::{self, ConstantCurvatureSettings};
 use tdcr::robot as core;
-use tdcr::rod::{self, RodSettings};
-use tdcr::{InvalidInput, linkage};
 
 use crate::convert::arguments::{optional, text};
 use crate::convert::arrays::{Lazy, frozen, frozen_frames, invalid, matrix4, type_name};
@@ -46,14 +43,9 @@ use crate::robot::tendon::Tendon;
 #[derive(Clone)]
 pub(crate) struct Robot(pub(crate) Arc<core::Robot>, Arc<Kept>);
 
-/// What is built on first use and kept with the robot.
+/// Parts that are built on first use and kept with the robot.
 #[derive(Default)]
 struct Kept {
-    linkage: OnceLock<Result<linkage::Plan, InvalidInput>>,
-    /// One per settings; see [`Robot::constant_curvature_plan`].
-    constant_curvature: [OnceLock<Result<constant_curvature::Plan, InvalidInput>>; 4],
-    /// The last few settings, latest last.
-    rod: Mutex<Vec<(RodSettings, Arc<rod::Plan>)>>,
     base: Lazy,
     tool: Lazy,
     rest_lengths: Lazy,
@@ -63,49 +55,6 @@ struct Kept {
 impl From<core::Robot> for Robot {
     fn from(robot: core::Robot) -> Self {
         Self(Arc::new(robot), Arc::default())
-    }
-}
-
-impl Robot {
-    /// The plan of the linkage model, made on first use.
-    pub(crate) fn linkage_plan(&self) -> Result<&linkage::Plan, InvalidInput> {
-        let plan = self.1.linkage.get_or_init(|| linkage::Plan::new(&self.0));
-        plan.as_ref().map_err(InvalidInput::clone)
-    }
-
-    /// The plan of the constant-curvature model, made on first use.
-    pub(crate) fn constant_curvature_plan(
-        &self,
-        settings: ConstantCurvatureSettings,
-    ) -> Result<&constant_curvature::Plan, InvalidInput> {
-        let place = 2 * settings.coupling as usize + usize::from(settings.extensible);
-        let plan = self.1.constant_curvature[place]
-            .get_or_init(|| constant_curvature::Plan::new(&self.0, settings));
-        plan.as_ref().map_err(InvalidInput::clone)
-    }
-}
-
-/// Rod plans kept with a robot.
-const MOST_PLANS: usize = 8;
-
-impl Robot {
-    /// The plan of the rod model, kept for the settings used last.
-    pub(crate) fn rod_plan(&self, settings: RodSettings) -> Result<Arc<rod::Plan>, InvalidInput> {
-        let kept = || self.1.rod.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut plans = kept();
-        if let Some(place) = plans.iter().position(|(known, _)| *known == settings) {
-            plans[place..].rotate_left(1);
-            return Ok(Arc::clone(&plans[plans.len() - 1].1));
-        }
-        // Nobody waits while it is made; of two made at once both are right.
-        drop(plans);
-        let plan = Arc::new(rod::Plan::new(&self.0, settings)?);
-        let mut plans = kept();
-        if plans.len() >= MOST_PLANS {
-            plans.remove(0);
-        }
-        plans.push((settings, Arc::clone(&plan)));
-        Ok(plan)
     }
 }
 

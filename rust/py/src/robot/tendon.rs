@@ -155,7 +155,7 @@ impl Tendon {
         Self::build(routing, end, stiffness, name)
     }
 
-    /// How the holes are described: "angles", "helical" or "holes".
+    /// Description of the holes: "angles", "helical" or "holes".
     #[getter]
     fn routing(&self) -> &'static str {
         match self.0.routing() {

@@ -9,7 +9,7 @@ use tdcr::InvalidInput;
 use tdcr::obstacle as core;
 
 use crate::convert::arrays::{
-    Lazy, aligned, frozen, frozen_points, invalid, type_name, vectors, wrong_shape,
+    Lazy, align, frozen, frozen_points, invalid, type_name, vectors, wrong_shape,
 };
 use crate::convert::python_side;
 use crate::scene::obstacle::Obstacle;
@@ -66,7 +66,7 @@ fn triangles(value: &Bound<'_, PyAny>) -> PyResult<Vec<[usize; 3]>> {
         return Err(PyTypeError::new_err(message));
     }
     let array = numpy.call_method1("ascontiguousarray", (array, "int64"))?;
-    let array: PyReadonlyArrayDyn<'_, i64> = aligned(array)?.extract()?;
+    let array: PyReadonlyArrayDyn<'_, i64> = align(array)?.extract()?;
     let number = |index: &i64| {
         let refuse = || InvalidInput::new("faces", "vertex numbers of 0 or more", index);
         usize::try_from(*index).map_err(|_| invalid(&refuse()))
@@ -87,7 +87,7 @@ impl Mesh {
     ) -> PyResult<PyClassInitializer<Self>> {
         let (vertices, faces) = (vectors("vertices", vertices)?, triangles(faces)?);
         let mesh = py.detach(|| core::Mesh::new(&vertices, &faces)).map_err(|e| invalid(&e))?;
-        let base = Obstacle::new(mesh.clone(), inside).holding();
+        let base = Obstacle::new(mesh.clone(), inside).initializer();
         let (vertices, faces) = (Lazy::default(), Lazy::default());
         Ok(base.add_subclass(Self { core: mesh, vertices, faces }))
     }

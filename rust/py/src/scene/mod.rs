@@ -9,24 +9,22 @@ pub(crate) mod signed_distance;
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
 use tdcr::InvalidInput;
-use tdcr::model::{Model, Report, State};
+use tdcr::forward::{Forward, ModelSettings};
 use tdcr::obstacle::{Fault, Obstacle, SignedDistance, Volume};
 use tdcr::robot::Robot;
-use tdcr::rod::contact::{LoadedRod, Scene, Scratch};
-use tdcr::rod::{Plan, RodSettings};
+use tdcr::rod::Plan;
+use tdcr::rod::contact::Scene;
 
 use crate::convert::arguments::wrong_type;
 use crate::convert::arrays::invalid;
-use crate::convert::interruptible;
-use crate::forward::rod::Load;
 use crate::scene::loads::Loads;
-use crate::scene::obstacle::{obstacles, raised};
+use crate::scene::obstacle::{fault_exception, obstacles};
 
 /// Obstacles, as Python knows them and as the core does, and loads.
 pub(crate) struct Surroundings {
@@ -73,7 +71,7 @@ impl Surroundings {
         self.stop.get_or_init(|| Arc::clone(stop));
     }
 
-    /// What there is, for those who do not take it: the name of the argument.
+    /// Name of the argument that is given, for models that take none.
     pub(crate) fn any(&self) -> Option<&'static str> {
         if !self.obstacles.is_empty() {
             return Some("obstacles");
@@ -81,15 +79,36 @@ impl Surroundings {
         self.loads.as_ref().map(|_| "loads")
     }
 
-    /// The robot's scene.
-    pub(crate) fn scene(
-        &self,
-        robot: &Robot,
-        plan: &Plan,
-        settings: &RodSettings,
-    ) -> Result<Scene, InvalidInput> {
+    /// Presence of a function of the caller's among the obstacles.
+    pub(crate) fn calls_functions(&self) -> bool {
+        self.obstacles.iter().any(|o| matches!(o.volume(), Volume::SignedDistance(_)))
+    }
+
+    /// Refuses surroundings for a model that knows no forces.
+    pub(crate) fn check(&self, settings: &ModelSettings) -> PyResult<()> {
         let loads = self.loads.as_ref().map(|loads| &loads.0);
-        Scene::new(robot, plan, &self.obstacles, loads, settings.body_radius)
+        settings.check_surroundings(&self.obstacles, loads).map_err(|e| invalid(&e))
+    }
+
+    /// Robot prepared for a model in these surroundings.
+    pub(crate) fn prepare<'r>(
+        &self,
+        robot: &'r Robot,
+        settings: ModelSettings,
+    ) -> PyResult<Forward<'r>> {
+        let loads = self.loads.as_ref().map(|loads| &loads.0);
+        Forward::new(robot, settings)
+            .and_then(|forward| forward.among(&self.obstacles, loads))
+            .map_err(|e| invalid(&e))
+    }
+
+    /// Scene of the rod of a robot, if there is anything around it.
+    pub(crate) fn scene(&self, robot: &Robot, plan: &Plan) -> Result<Option<Scene>, InvalidInput> {
+        if self.any().is_none() {
+            return Ok(None);
+        }
+        let loads = self.loads.as_ref().map(|loads| &loads.0);
+        Scene::new(robot, plan, &self.obstacles, loads, plan.settings().body_radius).map(Some)
     }
 
     pub(crate) fn same(&self, other: &Self, py: Python<'_>) -> PyResult<bool> {
@@ -131,131 +150,13 @@ fn listening(obstacle: Obstacle, index: Option<usize>, stop: &Stop) -> Obstacle 
     Obstacle::new(function, obstacle.inside())
 }
 
-/// A rod among obstacles whose first fault ends all work.
-pub(crate) struct Watched<'r> {
-    rod: LoadedRod<'r>,
-    stop: Arc<AtomicBool>,
-    fault: &'r Mutex<Option<Fault>>,
-}
-
-impl<'r> Watched<'r> {
-    pub(crate) fn new(
-        rod: LoadedRod<'r>,
-        stop: Arc<AtomicBool>,
-        fault: &'r Mutex<Option<Fault>>,
-    ) -> Self {
-        Self { rod: rod.stopped_by(Arc::clone(&stop)), stop, fault }
-    }
-
-    /// Displacements and the shape, found from rest or from an earlier shape.
-    pub(crate) fn solve_load(
-        &self,
-        load: Load,
-        start: Option<State>,
-    ) -> Result<(Vec<f64>, tdcr::Shape), InvalidInput> {
-        let mut work = Scratch::default();
-        let report = match (&load, start) {
-            (Load::Tensions(tensions), _) => self.rod.solve_tensions(tensions, &mut work)?,
-            (Load::Displacements(displacements), None) => {
-                let shape = self.shape(displacements)?;
-                return Ok((displacements.clone(), shape));
-            }
-            (Load::Displacements(displacements), Some(start)) => {
-                self.rod.robot().check_displacements(displacements)?;
-                self.rod.solve_from(&start, displacements, &mut work)?
-            }
-        };
-        self.watch(&mut work);
-        let message = self.rod.message(&[], &work);
-        let state = self.rod.take_state(work);
-        let displacements = match load {
-            Load::Displacements(displacements) => displacements,
-            Load::Tensions(_) => self.rod.displacements(&state),
-        };
-        Ok((displacements, tdcr::Shape { state, report, message }))
-    }
-
-    fn watch(&self, work: &mut Scratch) {
-        if let Some(fault) = work.take_fault() {
-            self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(fault);
-            // After that: what others fail with because of it comes too late.
-            self.stop.store(true, Ordering::SeqCst);
-        }
-    }
-}
-
-impl Model for Watched<'_> {
-    type Scratch = Scratch;
-
-    fn robot(&self) -> &Robot {
-        self.rod.robot()
-    }
-
-    fn strain_width(&self) -> usize {
-        self.rod.strain_width()
-    }
-
-    fn elements(&self) -> usize {
-        self.rod.elements()
-    }
-
-    fn solve(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
-        let report = self.rod.solve(displacements, work)?;
-        self.watch(work);
-        Ok(report)
-    }
-
-    fn resume(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
-        let report = self.rod.resume(displacements, work)?;
-        self.watch(work);
-        Ok(report)
-    }
-
-    fn state<'w>(&self, work: &'w Scratch) -> &'w State {
-        self.rod.state(work)
-    }
-
-    fn take_state(&self, work: Scratch) -> State {
-        self.rod.take_state(work)
-    }
-
-    fn message(&self, displacements: &[f64], work: &Scratch) -> String {
-        self.rod.message(displacements, work)
-    }
-}
-
 /// Raises the fault that work ended with, if it did.
-pub(crate) fn checked(py: Python<'_>, fault: Mutex<Option<Fault>>) -> PyResult<()> {
-    let Some(fault) = fault.into_inner().unwrap_or_else(PoisonError::into_inner) else {
-        return Ok(());
-    };
+pub(crate) fn raise_fault(py: Python<'_>, fault: Option<Fault>) -> PyResult<()> {
+    let Some(fault) = fault else { return Ok(()) };
     Err(match fault.downcast::<Named>() {
-        Ok(named) => raised(py, named.fault, Some(&format!("obstacles[{}]", named.obstacle))),
-        Err(fault) => raised(py, fault, None),
+        Ok(named) => {
+            fault_exception(py, named.fault, Some(&format!("obstacles[{}]", named.obstacle)))
+        }
+        Err(fault) => fault_exception(py, fault, None),
     })
-}
-
-/// Rods with more second derivatives than this may take longer than a second among meshes.
-const LONG: usize = 400;
-
-/// Solves once without the GIL, where Ctrl-C can stop it, if that may take long; but for the GIL that Python functions of obstacles take; these see Ctrl-C too.
-pub(crate) fn solve<T: Send>(
-    py: Python<'_>,
-    robot: &Robot,
-    plan: &Plan,
-    scene: &Scene,
-    job: impl FnOnce(&Watched<'_>) -> Result<T, InvalidInput> + Send,
-) -> PyResult<T> {
-    let fault = Mutex::new(None);
-    let rod = LoadedRod::new(robot, plan, scene).map_err(|e| invalid(&e))?;
-    let shape = if scene.calls_functions() || plan.second_derivatives() < LONG {
-        py.detach(|| job(&Watched::new(rod, Arc::default(), &fault)))
-    } else {
-        interruptible::run(py, None, |control| {
-            let stop = &control.stop;
-            job(&Watched::new(rod, Arc::clone(stop), &fault))
-        })?
-    };
-    checked(py, fault)?;
-    shape.map_err(|e| invalid(&e))
 }

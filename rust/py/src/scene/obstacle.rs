@@ -1,4 +1,4 @@
-//! What all obstacles share, and how arguments name them.
+//! Base class of all obstacles, and obstacles as arguments.
 
 use nalgebra::Vector3;
 use pyo3::prelude::*;
@@ -27,11 +27,11 @@ impl Obstacle {
     }
 
     /// The base of an obstacle of one kind.
-    pub(crate) fn holding(self) -> PyClassInitializer<Self> {
+    pub(crate) fn initializer(self) -> PyClassInitializer<Self> {
         self.into()
     }
 
-    /// What to make an equal one from.
+    /// Arguments of an equal one.
     pub(crate) fn new_args<'py>(
         &self,
         positional: Bound<'py, PyTuple>,
@@ -112,7 +112,7 @@ impl Obstacle {
         for chunk in points.chunks(CHUNK) {
             let found: Result<Vec<Near>, Fault> =
                 py.detach(|| chunk.iter().map(|x| self.0.nearest(x)).collect());
-            near.extend(found.map_err(|fault| raised(py, fault, None))?);
+            near.extend(found.map_err(|fault| fault_exception(py, fault, None))?);
             py.check_signals()?;
         }
         Ok(near)
@@ -130,9 +130,8 @@ fn finite_points(points: &Bound<'_, PyAny>) -> PyResult<Vec<Vector3<f64>>> {
     Ok(points)
 }
 
-/// What a signed distance failed with, as Python raises it: its own exception, with a note that says
-/// whose it was where there are several.
-pub(crate) fn raised(py: Python<'_>, fault: Fault, obstacle: Option<&str>) -> PyErr {
+/// Exception of a fault: the one that a function raised, with a note that names the obstacle where there are several.
+pub(crate) fn fault_exception(py: Python<'_>, fault: Fault, obstacle: Option<&str>) -> PyErr {
     match fault.downcast::<PyErr>() {
         Ok(error) => {
             if let Some(name) = obstacle
@@ -207,7 +206,7 @@ pub(crate) fn clearance(
                 }
                 Ok(())
             });
-            done.map_err(|fault| raised(py, fault, Some(&format!("obstacles[{i}]"))))?;
+            done.map_err(|fault| fault_exception(py, fault, Some(&format!("obstacles[{i}]"))))?;
             py.check_signals()?;
         }
     }

@@ -49,7 +49,7 @@ impl Sphere {
     ) -> PyResult<PyClassInitializer<Self>> {
         let sphere = core::Sphere::new(&vector("center", center)?, number("radius", radius)?);
         let sphere = sphere.map_err(|e| invalid(&e))?;
-        Ok(Obstacle::new(sphere, inside).holding().add_subclass(Self(sphere)))
+        Ok(Obstacle::new(sphere, inside).initializer().add_subclass(Self(sphere)))
     }
 
     /// Centre, shape (3,) [m].
@@ -110,7 +110,7 @@ impl Cylinder {
         let (point, axis) = (vector("point", point)?, vector("axis", axis)?);
         let cylinder = core::Cylinder::new(&point, &axis, number("radius", radius)?);
         let cylinder = cylinder.map_err(|e| invalid(&e))?;
-        Ok(Obstacle::new(cylinder, inside).holding().add_subclass(Self(cylinder)))
+        Ok(Obstacle::new(cylinder, inside).initializer().add_subclass(Self(cylinder)))
     }
 
     /// The point on its axis that was given, shape (3,) [m].
@@ -174,7 +174,7 @@ impl HalfSpace {
     ) -> PyResult<PyClassInitializer<Self>> {
         let half_space = core::HalfSpace::new(&vector("point", point)?, &vector("normal", normal)?);
         let half_space = half_space.map_err(|e| invalid(&e))?;
-        Ok(Obstacle::new(half_space, inside).holding().add_subclass(Self(half_space)))
+        Ok(Obstacle::new(half_space, inside).initializer().add_subclass(Self(half_space)))
     }
 
     /// The point of its plane that was given, shape (3,) [m].
@@ -232,7 +232,7 @@ impl Capsule {
         let (a, b) = (vector("a", a)?, vector("b", b)?);
         let capsule = core::Capsule::new(&a, &b, number("radius", radius)?);
         let capsule = capsule.map_err(|e| invalid(&e))?;
-        Ok(Obstacle::new(capsule, inside).holding().add_subclass(Self(capsule)))
+        Ok(Obstacle::new(capsule, inside).initializer().add_subclass(Self(capsule)))
     }
 
     /// The first end of its segment, shape (3,) [m].
@@ -300,7 +300,7 @@ impl Cuboid {
         let rotation =
             rotation.map_or_else(|| Ok(Matrix3::identity()), |r| matrix3("rotation", r))?;
         let cuboid = core::Cuboid::new(&center, &half, &rotation).map_err(|e| invalid(&e))?;
-        Ok(Obstacle::new(cuboid, inside).holding().add_subclass(Self(cuboid)))
+        Ok(Obstacle::new(cuboid, inside).initializer().add_subclass(Self(cuboid)))
     }
 
     /// Centre, shape (3,) [m].

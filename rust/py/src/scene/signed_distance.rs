@@ -9,7 +9,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use tdcr::obstacle::{self as core, Fault, by_differences};
 
-use crate::convert::arguments::{returned, wrong_type};
+use crate::convert::arguments::{number_of_point, wrong_type};
 use crate::convert::arrays::vector;
 use crate::scene::obstacle::Obstacle;
 
@@ -47,7 +47,7 @@ fn call<'py>(
 }
 
 fn value(f: &Py<PyAny>, x: &Vector3<f64>) -> Result<f64, Fault> {
-    let call = |py: Python<'_>| returned("f", "one number for a point", &call(py, f, x)?);
+    let call = |py: Python<'_>| number_of_point("f", "one number for a point", &call(py, f, x)?);
     Ok(Python::attach(call)?)
 }
 
@@ -83,7 +83,7 @@ impl SignedDistance {
         let f = callable("f", f)?;
         let gradient = gradient.map(|g| callable("gradient", g)).transpose()?;
         let volume = core::SignedDistance::new(function(&f, gradient.as_ref(), py));
-        Ok(Obstacle::new(volume, inside).holding().add_subclass(Self { f, gradient }))
+        Ok(Obstacle::new(volume, inside).initializer().add_subclass(Self { f, gradient }))
     }
 
     /// The function of the distance.

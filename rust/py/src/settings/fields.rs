@@ -157,7 +157,7 @@ pub(crate) fn check_keywords(
     keywords: Option<&Bound<'_, PyDict>>,
     known: &[&str],
 ) -> PyResult<()> {
-    for name in keywords.into_iter().flat_map(|keywords| keywords.keys()) {
+    for name in keywords.into_iter().flat_map(PyDictMethods::keys) {
         let name: PyBackedStr = name.extract()?;
         if !known.contains(&&*name) {
             let message = format!("{class}.__new__() got an unexpected keyword argument '{name}'");

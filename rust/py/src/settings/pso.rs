@@ -123,7 +123,7 @@ settings_class! {
             self::replace(py, &pso::PsoSettings::mahfoudi(), changes)
         }
 
-        /// The same settings but for the given ones.
+        /// These settings with the given ones changed.
         #[pyo3(signature = (**changes))]
         fn replace<'py>(
             &self,

@@ -1,5 +1,5 @@
-//! Standard errors of fitted values by the sandwich estimate with leverages, HC3 (J. G. MacKinnon, H. White, Journal of
-//! Econometrics 29 (1985), doi:10.1016/0304-4076(85)90158-7).
+//! Standard errors of fitted values by the sandwich estimate with leverages, HC3 (J. G. `MacKinnon`, H. White, Journal
+//! of Econometrics 29 (1985), doi:10.1016/0304-4076(85)90158-7).
 
 use nalgebra::{DMatrix, DVector};
 use rayon::ThreadPool;

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::quadratic_cost::QuadraticCost;
 use super::task::{Holes, Task};
-use crate::rod::one_subsegment::Stage;
+use crate::rod::one_subsegment::OneSubsegment;
 
 /// A routing under tensions, and the sum of its disks' squared distances.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1e-14;
 
 /// The subsegments of a robot, routed and solved one by one.
 pub(super) struct TensionSolver {
-    stages: Vec<Stage>,
+    stages: Vec<OneSubsegment>,
     near: Vec<Vec<f64>>,
     /// Steps that were taken.
     pub(super) steps: usize,
@@ -40,7 +40,7 @@ struct CostAtTensions {
 impl TensionSolver {
     pub(super) fn new(task: &Task<'_>) -> Self {
         let n = task.targets.len();
-        let stages = (0..n).map(|i| Stage::new(&task.plan, i)).collect();
+        let stages = (0..n).map(|i| OneSubsegment::new(&task.plan, i)).collect();
         Self { stages, near: vec![Vec::new(); n], steps: 0 }
     }
 
@@ -57,7 +57,7 @@ impl TensionSolver {
         let (mut cost, mut strains) =
             (QuadraticCost::of(task), Vec::with_capacity(self.stages.len()));
         for ((stage, near), target) in self.stages.iter_mut().zip(&self.near).zip(task.targets) {
-            if !stage.bend(tensions, near) {
+            if !stage.solve(tensions, near) {
                 return None;
             }
             strains.push(stage.strains().to_vec());
@@ -76,7 +76,7 @@ impl TensionSolver {
             }
             cost.add(&(frame.translation - target), &velocity);
             if task.bounds.is_some() {
-                let (pulls, slopes) = stage.pulls(count);
+                let (pulls, slopes) = stage.displacements(count);
                 cost.add_pulls(&pulls, &slopes);
             }
         }

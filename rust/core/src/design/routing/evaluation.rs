@@ -86,7 +86,7 @@ impl<'t, 'a> Evaluator<'t, 'a> {
                 let azimuths = task.azimuths(&candidate.holes, search.count);
                 let holes = (azimuths, task.radii.clone());
                 if let Some(point) = Point::at_tensions(task, robot, holes, &tensions)? {
-                    let point = self.into_bounds(point, Freedom::of_pulls())?;
+                    let point = self.enforce_bounds(point, Freedom::of_pulls())?;
                     self.pull(point, Some(candidate.holes.clone()))?;
                 }
             }
@@ -95,7 +95,7 @@ impl<'t, 'a> Evaluator<'t, 'a> {
     }
 
     /// Point within the bounds of displacements: itself, or where a descent within them leads.
-    pub(super) fn into_bounds(
+    pub(super) fn enforce_bounds(
         &mut self,
         point: Point,
         freedom: Freedom,

@@ -41,6 +41,12 @@ use crate::status::Status;
 pub use settings::RoutingSettings;
 
 /// Knowledge about the nearest routing.
+///
+/// ```
+/// use tdcr::design::Optimality;
+///
+/// assert_eq!(Optimality::Exhaustive.as_str(), "exhaustive");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Optimality {
     /// Every disk is in its place: nothing is nearer.
@@ -64,6 +70,22 @@ impl Optimality {
 }
 
 /// A robot whose tendons were routed for a shape.
+///
+/// ```
+/// use tdcr::design::{RoutingSettings, routing};
+/// use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+///
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// let backbone = Backbone::new(BackboneSpec::straight(0.1, 2))?;
+/// let robot = Robot::new(backbone, vec![Tendon::straight(0.0, 0.01)?], None, None, None)?;
+/// // The rest shape is reached without any pull.
+/// let targets: Vec<_> = robot.rest_frames().iter().skip(1).map(|disk| disk.translation).collect();
+/// let settings = RoutingSettings { holes: Some(4), ..RoutingSettings::default() };
+/// let found = routing(&robot, &targets, None, None, &settings)?;
+/// assert!(found.rms < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Routed {
     /// The robot with its new tendons.

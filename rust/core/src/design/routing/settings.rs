@@ -4,6 +4,14 @@ use crate::error::InvalidInput;
 use crate::rod::RodSettings;
 
 /// Choices of a routing design.
+///
+/// ```
+/// use tdcr::design::RoutingSettings;
+///
+/// // Any azimuth instead of twelve holes.
+/// let settings = RoutingSettings { holes: None, ..RoutingSettings::default() };
+/// assert!(settings.validate().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoutingSettings {
     /// Settings of the rod model that the design is for.

@@ -284,7 +284,7 @@ impl<'t, 'a> Solver<'t, 'a> {
             let robot = task.with_azimuths(&holes.0, &holes.1)?;
             if let Some(point) = Point::at_tensions(task, robot, holes, &tensions)? {
                 let point = point.descend(task, &freedom, &mut self.steps)?;
-                let point = self.evaluator.into_bounds(point, freedom)?;
+                let point = self.evaluator.enforce_bounds(point, freedom)?;
                 self.evaluator.pull(point, None)?;
             }
             if task.is_stopped() || self.evaluator.is_met() {
@@ -309,7 +309,7 @@ impl<'t, 'a> Solver<'t, 'a> {
         if let Some(best) = self.evaluator.best.as_ref().filter(|best| !best.is_met(task)) {
             let freedom = Freedom::whole(task);
             let point = best.point.clone().descend(task, &freedom, &mut self.steps)?;
-            let point = self.evaluator.into_bounds(point, freedom)?;
+            let point = self.evaluator.enforce_bounds(point, freedom)?;
             self.relaxed = self.relaxed.min(point.value);
         }
         Ok(())

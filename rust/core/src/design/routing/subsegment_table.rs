@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::task::Task;
 use crate::lie::Pose;
-use crate::rod::one_subsegment::Stage;
+use crate::rod::one_subsegment::OneSubsegment;
 
 /// Numbers of the holes of all tendons on one disk.
 pub(super) type Choice = Vec<usize>;
@@ -22,7 +22,7 @@ struct Entry {
 
 /// Entries of one subsegment, or of several that are alike; rows for the choices of its base disk.
 struct Table {
-    stage: Stage,
+    stage: OneSubsegment,
     disk: usize,
     entries: Vec<Option<Entry>>,
 }
@@ -58,9 +58,9 @@ impl SubsegmentTables {
         };
         let (mut tables, mut which): (Vec<Table>, Vec<usize>) = (Vec::new(), Vec::new());
         for i in 0..task.targets.len() {
-            let stage = Stage::new(&task.plan, i);
+            let stage = OneSubsegment::new(&task.plan, i);
             let same = tables.iter().position(|table| {
-                table.stage.alike(&stage)
+                table.stage.bends_like(&stage)
                     && (0..2).all(|end| places(i + end).eq(places(table.disk + end)))
             });
             which.push(same.unwrap_or(tables.len()));
@@ -96,7 +96,7 @@ impl SubsegmentTables {
                     stage.route(|k| {
                         (task.hole(k, disk, base[k], count), task.hole(k, disk + 1, next[k], count))
                     });
-                    *entry = stage.bend(tensions, near).then(|| Entry::of(task, stage));
+                    *entry = stage.solve(tensions, near).then(|| Entry::of(task, stage));
                 }
             }
         }
@@ -119,14 +119,17 @@ impl SubsegmentTables {
 
 impl Entry {
     /// Last solution of a subsegment.
-    fn of(task: &Task<'_>, stage: &mut Stage) -> Self {
+    fn of(task: &Task<'_>, stage: &mut OneSubsegment) -> Self {
         let tendons = task.tendons();
         let mut rates = vec![(Vector3::zeros(), Vector3::zeros()); tendons];
         for (k, rate) in stage.tendons().iter().zip(stage.rates().column_iter()) {
             rates[*k] = (rate.fixed_rows::<3>(0).into(), rate.fixed_rows::<3>(3).into());
         }
-        let (pulls, pull_slopes) =
-            if task.bounds.is_some() { stage.pulls(tendons) } else { (Vec::new(), Vec::new()) };
+        let (pulls, pull_slopes) = if task.bounds.is_some() {
+            stage.displacements(tendons)
+        } else {
+            (Vec::new(), Vec::new())
+        };
         let strains = stage.strains().to_vec();
         Self { end: stage.end(), rates, pulls, pull_slopes, strains }
     }

@@ -9,8 +9,8 @@ use crate::error::InvalidInput;
 use crate::inverse::Target;
 use crate::inverse::batch::near_enough;
 use crate::inverse::multistart::{Freedom, Multistart, SearchOptions};
-use crate::inverse::outcome::Answer;
 use crate::inverse::position_goal::PositionGoal;
+use crate::inverse::single::Inversion;
 use crate::inverse::tension_problem::{TensionProblem, evaluate_answer};
 use crate::lie::{Pose, so3};
 use crate::model::State;
@@ -22,41 +22,6 @@ const STARTS: usize = 24;
 const BEND: f64 = 1.0;
 /// Most tendons.
 const TENDONS: usize = 63;
-
-/// Answer of an inverse for disk positions.
-///
-/// ```
-/// use tdcr::inverse::{Bounds, InverseSettings, RodInverse};
-/// use tdcr::rod::{Plan, RodSettings};
-/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
-/// # fn main() -> Result<(), tdcr::InvalidInput> {
-/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
-/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
-/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
-/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
-/// let plan = Plan::new(&robot, RodSettings::default())?;
-/// let inverse = RodInverse::new(&robot, &plan, &Bounds::default(), InverseSettings::default())?;
-/// // The disks as they are at rest.
-/// let positions: Vec<_> =
-///     robot.rest_frames().iter().skip(1).map(|frame| Some(frame.translation)).collect();
-/// let found = inverse.solve_positions(&positions, None, None)?;
-/// assert!(found.message.is_empty() && found.displacements.iter().all(|d| d.abs() < 1e-8));
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Debug)]
-pub struct PositionsAnswer {
-    /// Outcome; its distance is the largest of a disk.
-    pub answer: Answer,
-    /// Tendon displacements \[m\].
-    pub displacements: Vec<f64>,
-    /// Tensions, in the unit of the results.
-    pub tensions: Vec<f64>,
-    /// Reason why it did not converge; empty when every position is met.
-    pub message: String,
-    /// Shape, where displacements do not determine it.
-    pub state: Option<State>,
-}
 
 impl RodInverse<'_> {
     /// Brings disks as near as possible to positions \[m\], world frame, one per disk from the first, or none: least
@@ -70,7 +35,7 @@ impl RodInverse<'_> {
         places: &[Option<Vector3<f64>>],
         start: Option<&State>,
         stop: Option<&AtomicBool>,
-    ) -> Result<PositionsAnswer, InvalidInput> {
+    ) -> Result<Inversion, InvalidInput> {
         let disks = self.robot.backbone().subsegments();
         if places.len() != disks {
             let expected = format!("{disks} places, one per disk from the first");
@@ -102,7 +67,7 @@ impl RodInverse<'_> {
         places: &[Option<Vector3<f64>>],
         start: Option<&State>,
         stop: Option<&AtomicBool>,
-    ) -> PositionsAnswer {
+    ) -> Inversion {
         let world = self.robot.base().inverse();
         let local: Vec<_> = places.iter().map(|p| p.map(|p| world.transform(&p))).collect();
         let known = local.iter().enumerate().filter_map(|(disk, place)| Some((disk, (*place)?)));
@@ -112,8 +77,8 @@ impl RodInverse<'_> {
         let mut problem =
             TensionProblem::new(self.equilibrium(stop), goal, lengths, &self.units, &self.ranges);
         let mut search = Multistart::<R> { stop, ..Multistart::default() };
-        problem.rod.rest();
-        let given = start.is_some_and(|state| problem.rod.begin(state));
+        problem.rod.reset();
+        let given = start.is_some_and(|state| problem.rod.start_from(state));
         let first: Vec<f64> =
             if given { self.unknowns(problem.rod.tensions()) } else { Vec::new() };
         let before = usize::from(given);
@@ -124,7 +89,7 @@ impl RodInverse<'_> {
         let options =
             SearchOptions { freedom: Freedom::None, fall_back: false, ..self.options(STARTS) };
         let options = SearchOptions { starts: options.starts.min(self.settings.starts), ..options };
-        let mut from_rest = self.from_rest(stop);
+        let mut from_rest = self.rest_solves(stop);
         let found = match &mut from_rest {
             Some(from_rest) => {
                 from_rest.search(&mut problem, &mut search, &self.space, options, start_point)
@@ -134,7 +99,6 @@ impl RodInverse<'_> {
         let answer =
             evaluate_answer(found, &mut problem, &mut search, |goal| (goal.errors().0, 0.0));
         let (most, mean, disk) = problem.goal.errors();
-        self.note_fault(problem.rod.as_mut(), from_rest.as_mut());
         let active = self.active_bounds(&search.point, &problem);
         let message = match answer.status {
             Status::Converged => from_rest.map_or("", |from_rest| from_rest.message()).to_owned(),
@@ -157,7 +121,7 @@ impl RodInverse<'_> {
                 )
             }
         };
-        let mut placed = PositionsAnswer {
+        let mut placed = Inversion {
             answer,
             displacements: vec![0.0; self.units.len()],
             tensions: vec![0.0; self.units.len()],

@@ -8,7 +8,6 @@ use crate::inverse::multistart::{Freedom, Multistart, SearchOptions, SearchOutco
 use crate::inverse::tension_problem::TensionProblem;
 use crate::lie::{Pose, so3};
 use crate::model::Model as _;
-use crate::obstacle::Fault;
 use crate::robot::Robot;
 use crate::rod::contact::{LoadedRod, Scratch};
 use crate::status::Status;
@@ -62,12 +61,12 @@ impl<'a> FromRest<'a> {
         if first.status != Status::Converged {
             return first;
         }
-        problem.rod.keep(FIRST_SLOT);
+        problem.rod.save(FIRST_SLOT);
         let mut first_point = search.point.clone();
         let (mut found, mut iterations, mut starts) = (first, first.iterations, first.starts);
         for tried in 1..=ANSWERS {
             let point = search.point.clone();
-            problem.rod.keep(LAST_SLOT);
+            problem.rod.save(LAST_SLOT);
             // Its freedom goes to the least sum T² first, if rest leads to that answer too.
             if options.freedom != Freedom::None {
                 let lower =
@@ -79,7 +78,7 @@ impl<'a> FromRest<'a> {
                         return SearchOutcome { iterations, starts, ..found };
                     }
                     if tried == 1 {
-                        problem.rod.keep(FIRST_SLOT);
+                        problem.rod.save(FIRST_SLOT);
                         first_point.clone_from(&search.point);
                     }
                 }
@@ -152,10 +151,6 @@ impl<'a> FromRest<'a> {
         }
         "met on a way through other shapes: from rest the same displacements lead to another shape (start from answer.shape)"
     }
-
-    pub(super) fn take_fault(&mut self) -> Option<Fault> {
-        self.work.take_fault()
-    }
 }
 
 /// Restores an answer from its slot and evaluates it.
@@ -166,7 +161,7 @@ fn restore_answer<const R: usize, G: Goal<R>>(
     point: &[f64],
 ) {
     problem.forget();
-    problem.rod.go_back(place);
+    problem.rod.restore(place);
     search.point.clear();
     search.point.extend_from_slice(point);
     search.solver.evaluate(problem, point);

@@ -7,8 +7,8 @@ mod path;
 mod starts;
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Vector2, Vector3};
 
@@ -23,7 +23,7 @@ use super::tension_problem::{TensionProblem, evaluate_answer};
 use super::{InverseSettings, Method, Target};
 use crate::error::InvalidInput;
 use crate::model::{Model, State};
-use crate::obstacle::Fault;
+use crate::obstacle::{Fault, FirstFault};
 use crate::robot::Robot;
 use crate::rod::contact::{self, LoadedRod, Scene};
 use crate::rod::equilibrium::FreeRod;
@@ -31,7 +31,6 @@ use crate::rod::equilibrium::{ContactRod, Equilibrium};
 use crate::rod::{self, Plan, Rod};
 use crate::solve::convex_region::Region;
 use crate::status::Status;
-pub use disk_positions::PositionsAnswer;
 use from_rest::FromRest;
 
 /// Buffers of a solve and the tensions it found.
@@ -110,8 +109,8 @@ pub struct RodInverse<'a> {
     arcs: Option<ConstantCurvatureInverse<'a>>,
     /// Among obstacles and under loads.
     loaded: Option<LoadedRod<'a>>,
-    /// The first fault of an obstacle's function.
-    fault: Arc<Mutex<Option<Fault>>>,
+    /// Cell for the first fault of an obstacle's function.
+    first_fault: FirstFault,
 }
 
 /// Largest unknown \[rad\], two turns of the rod by one tendon alone, unless bounds ask for more: targets just out of
@@ -144,7 +143,7 @@ impl<'a> RodInverse<'a> {
         let rest = FreeRod::new(Rod::new(robot, plan));
         let length = robot.backbone().total_length();
         let count = robot.tendons().len();
-        let lever = |k: usize| rest.softness(k).sqrt().max(LEVER * length);
+        let lever = |k: usize| rest.shortening(k).sqrt().max(LEVER * length);
         let units: Vec<f64> = (0..count).map(|k| 1.0 / lever(k)).collect();
         let mut inverse = Self {
             robot,
@@ -156,7 +155,7 @@ impl<'a> RodInverse<'a> {
             rest,
             arcs: ConstantCurvatureInverse::for_guesses(robot, &settings),
             loaded: None,
-            fault: Arc::default(),
+            first_fault: FirstFault::default(),
         };
         inverse.add_tension_bounds(bounds);
         Ok(inverse)
@@ -168,36 +167,14 @@ impl<'a> RodInverse<'a> {
     /// As [`LoadedRod::new`].
     pub fn among(self, scene: &'a Scene) -> Result<Self, InvalidInput> {
         let loaded = LoadedRod::new(self.robot, self.rest.plan(), scene)?;
+        let loaded = loaded.reporting_to(&self.first_fault);
         Ok(Self { loaded: Some(loaded), ..self })
     }
 
     /// Fault with which a function of an obstacle ended all work, if it did.
     #[must_use]
     pub fn take_fault(&self) -> Option<Fault> {
-        self.fault.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
-
-    /// Solves unless a function of an obstacle failed before, and keeps its fault if it fails now.
-    fn solve_without_fault(
-        &self,
-        work: &mut RodScratch<'_>,
-        solve: impl FnOnce(&mut RodScratch<'_>) -> Answer,
-    ) -> Answer {
-        let fault = || self.fault.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.loaded.is_some() && fault().is_some() {
-            return Answer::none();
-        }
-        let answer = solve(work);
-        self.note_fault(work.problem.rod.as_mut(), work.from_rest.as_mut());
-        answer
-    }
-
-    /// Keeps the first fault of an obstacle's function.
-    fn note_fault(&self, rod: &mut dyn Equilibrium, from_rest: Option<&mut FromRest<'_>>) {
-        let own = from_rest.and_then(FromRest::take_fault);
-        if let Some(new) = rod.take_fault().or(own) {
-            self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(new);
-        }
+        self.first_fault.take()
     }
 
     /// The robot under tensions, at rest.
@@ -208,7 +185,7 @@ impl<'a> RodInverse<'a> {
         }
     }
 
-    fn from_rest<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Option<FromRest<'w>> {
+    fn rest_solves<'w>(&'w self, stop: Option<&'w AtomicBool>) -> Option<FromRest<'w>> {
         self.loaded.as_ref().map(|rod| FromRest::new(rod, self.robot, stop))
     }
 
@@ -345,28 +322,29 @@ impl Inverter for RodInverse<'_> {
             bends: Vec::new(),
             met: false,
             before: None,
-            from_rest: self.from_rest(stop),
+            from_rest: self.rest_solves(stop),
         }
     }
 
     /// The start is a shape with its tensions.
     fn solve(&self, target: &Target, start: Option<&State>, work: &mut RodScratch<'_>) -> Answer {
-        self.solve_without_fault(work, |work| {
-            work.problem.forget();
-            let given = if let Some(state) = start {
-                work.problem.rod.begin(state)
-            } else {
-                work.problem.rod.rest();
-                false
-            };
-            self.search(target, given, self.options(self.settings.starts), work)
-        })
+        if self.first_fault.is_set() {
+            return Answer::none();
+        }
+        work.problem.forget();
+        let given = if let Some(state) = start {
+            work.problem.rod.start_from(state)
+        } else {
+            work.problem.rod.reset();
+            false
+        };
+        self.search(target, given, self.options(self.settings.starts), work)
     }
 
     /// Moves and turns the tool in even steps where one step does not lead there without a
     /// jump; from a few other starts only when that fails, and then `starts` is more than 1.
     fn follow(&self, target: &Target, work: &mut RodScratch<'_>) -> Answer {
-        self.solve_without_fault(work, |work| self.track(target, work))
+        if self.first_fault.is_set() { Answer::none() } else { self.track(target, work) }
     }
 
     fn write_tensions(&self, work: &RodScratch<'_>, place: &mut [f64]) {

@@ -37,6 +37,13 @@ pub struct Row {
 }
 
 /// Answers in the order of the rows; none when the call was stopped.
+///
+/// ```
+/// use tdcr::planar::Rows;
+///
+/// let stopped: Rows = None;
+/// assert!(stopped.is_none());
+/// ```
 pub type Rows = Option<Vec<SwarmInverse>>;
 
 /// Rows of one job: enough to pay for its swarm's memory, few enough to stop and to share well.

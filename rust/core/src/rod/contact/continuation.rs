@@ -96,9 +96,9 @@ impl LoadedRod<'_> {
         let plan = self.plan();
         let count = plan.rest_lengths.len();
         let chain = &mut work.chain;
-        chain.rest(plan);
-        chain.bound(plan, &vec![0.0; count]);
-        chain.give = 0.0;
+        chain.reset(plan);
+        chain.set_bounds(plan, &vec![0.0; count]);
+        chain.added_compliance = 0.0;
         chain.assemble(plan, f64::INFINITY);
         work.descent.here.strains.clone_from(&chain.strains);
         self.stiffen(work);

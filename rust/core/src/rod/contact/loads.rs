@@ -6,6 +6,15 @@ use crate::error::InvalidInput;
 use crate::robot::Robot;
 
 /// Loads on a robot, in the world's axes; all of them keep their direction.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::rod::contact::Loads;
+///
+/// // One newton to the side at the tip, and disks of 2 g under gravity.
+/// let loads = Loads { tip_force: Vector3::x(), disk_mass: 2e-3, ..Loads::default() };
+/// assert!(loads.validate().is_ok());
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loads {
     /// Acceleration of gravity \[m/s²\].

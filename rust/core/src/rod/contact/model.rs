@@ -11,23 +11,49 @@ use crate::error::InvalidInput;
 use crate::lie::Pose;
 use crate::model::Contact;
 use crate::model::{Model, Report, State};
-use crate::obstacle::{Fault, Near};
+use crate::obstacle::{Fault, FirstFault, Near};
 use crate::robot::Robot;
 use crate::rod::dual_newton::Ending;
-use crate::rod::model::{Rod, read_state, told, write_state};
-use crate::rod::newton_system::Chain;
+use crate::rod::model::{Rod, read_state, report, write_state};
+use crate::rod::newton_system::NewtonSystem;
 use crate::rod::plan::Plan;
 use crate::status::Status;
 
 /// Contacts are listed up to this gap, in shares of the robot's length.
 const TOUCH: f64 = 1e-9;
 /// Buffers of a solve.
+///
+/// ```
+/// use tdcr::rod::contact::Scratch;
+/// # use nalgebra::Vector3;
+/// # use tdcr::model::Model;
+/// # use tdcr::obstacle::{HalfSpace, Obstacle};
+/// # use tdcr::rod::contact::{LoadedRod, Scene};
+/// # use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// // A wall 30 mm beside the robot.
+/// let wall = HalfSpace::new(&Vector3::new(0.03, 0.0, 0.0), &-Vector3::x())?;
+/// let scene = Scene::new(&robot, &plan, &[Obstacle::new(wall, false)], None, 0.0)?;
+/// let rod = LoadedRod::new(&robot, &plan, &scene)?;
+/// let mut scratch = Scratch::default();
+/// rod.solve(&[-0.002, f64::INFINITY, f64::INFINITY], &mut scratch)?;
+/// // No obstacle's function failed.
+/// assert!(scratch.take_fault().is_none());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Default)]
 pub struct Scratch {
     pub(in crate::rod) state: State,
     pub(in crate::rod) descent: Descent,
     /// For the compliance of the tendons at rest.
-    pub(in crate::rod) chain: Chain,
+    pub(in crate::rod) chain: NewtonSystem,
     /// The last solve, or the last load that was reached.
     pub(in crate::rod) kept: Checkpoint,
     pub(in crate::rod) left: Left,
@@ -49,12 +75,38 @@ impl Scratch {
 }
 
 /// A rod in its surroundings, ready to solve.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use tdcr::model::Model;
+/// # use tdcr::obstacle::{HalfSpace, Obstacle};
+/// # use tdcr::rod::contact::{LoadedRod, Scene};
+/// # use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// // A wall 30 mm beside the robot.
+/// let wall = HalfSpace::new(&Vector3::new(0.03, 0.0, 0.0), &-Vector3::x())?;
+/// let scene = Scene::new(&robot, &plan, &[Obstacle::new(wall, false)], None, 0.0)?;
+/// let rod = LoadedRod::new(&robot, &plan, &scene)?;
+/// let shape = rod.shape(&[-0.01, f64::INFINITY, f64::INFINITY])?;
+/// assert_eq!(shape.report.status, tdcr::Status::Converged);
+/// // It leans on the wall.
+/// assert!(shape.state.contacts.iter().any(|contact| contact.force.x < 0.0));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct LoadedRod<'r> {
     rod: Rod<'r>,
     scene: &'r Scene,
     /// Length of the shortest subsegment \[m\].
     pub(in crate::rod) shortest: f64,
+    first_fault: Option<FirstFault>,
 }
 
 impl<'r> LoadedRod<'r> {
@@ -67,7 +119,7 @@ impl<'r> LoadedRod<'r> {
         plan.settings.tendons.require_tensions("tendons", expected)?;
         let lengths = (0..plan.data.len()).map(|i| plan.length(i));
         let shortest = lengths.fold(f64::INFINITY, f64::min);
-        Ok(Self { rod: Rod::new(robot, plan), scene, shortest })
+        Ok(Self { rod: Rod::new(robot, plan), scene, shortest, first_fault: None })
     }
 
     /// The same, whose solves end soon after the flag is set, with the status of an iteration limit.
@@ -76,56 +128,25 @@ impl<'r> LoadedRod<'r> {
         Self { rod: self.rod.stopped_by(stop), ..self }
     }
 
+    /// Rod whose faults go to a cell, rather than stay in the buffers, and whose solves end soon after the cell's
+    /// flag is set.
+    #[must_use]
+    pub fn reporting_to(self, first_fault: &FirstFault) -> Self {
+        let rod = self.rod.stopped_by(Arc::clone(first_fault.stop()));
+        Self { rod, first_fault: Some(first_fault.clone()), ..self }
+    }
+
+    /// Moves the fault of a solve to the cell that collects faults, if there is one.
+    pub(in crate::rod) fn report_fault(&self, work: &mut Scratch) {
+        if let Some(first_fault) = &self.first_fault
+            && let Some(fault) = work.fault.take()
+        {
+            first_fault.keep(fault);
+        }
+    }
+
     pub(in crate::rod) fn plan(&self) -> &'r Plan {
         self.rod.plan
-    }
-
-    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
-    /// elements, under the whole loads from the first step on; a start that does not help is dropped.
-    ///
-    /// # Errors
-    /// `InvalidInput` for a start with another number of strains.
-    pub fn solve_from(
-        &self,
-        start: &State,
-        displacements: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        let plan = self.plan();
-        self.begin(work);
-        let Descent { here, estimates, .. } = &mut work.descent;
-        read_state(start, plan, &mut here.strains, &mut estimates.tensions)?;
-        let own = estimates.tensions.iter().zip(&plan.compliance);
-        let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, give))| l - t * give);
-        work.kept.given = Some(TendonTarget::Lengths(from.collect()));
-        // A fault comes again, and is told, where the shape is evaluated.
-        if self.sink(work).is_err() {
-            work.sunk = None;
-        }
-        work.ending = Ending::Converged;
-        self.recall(start, work);
-        self.resume(displacements, work)
-    }
-
-    /// Displacements under which a shape has the lengths and tensions that it has; see [`Rod::displacements`].
-    #[must_use]
-    pub fn displacements(&self, state: &State) -> Vec<f64> {
-        self.rod.displacements(state)
-    }
-
-    /// The shape under given tensions, in the unit of the results: displacements are then what it has
-    /// ([`Self::displacements`]). Tensions, loads and contacts grow together from rest.
-    ///
-    /// # Errors
-    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
-    pub fn solve_tensions(
-        &self,
-        tensions: &[f64],
-        work: &mut Scratch,
-    ) -> Result<Report, InvalidInput> {
-        self.plan().check_tensions(tensions)?;
-        let tensions = tensions.iter().map(|tension| tension / self.plan().unit).collect();
-        Ok(self.rise(&TendonTarget::Tensions(tensions), work, self.rod.stop.as_deref()))
     }
 
     /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
@@ -184,7 +205,7 @@ impl<'r> LoadedRod<'r> {
 
     fn finish(&self, work: &mut Scratch, evaluations: usize) -> Report {
         self.written(work);
-        told(work.ending, work.left.worst(), evaluations)
+        report(work.ending, work.left.worst(), evaluations)
     }
 
     /// The shape at hand, written out.
@@ -238,7 +259,9 @@ impl<'r> LoadedRod<'r> {
         work: &mut Scratch,
         stop: Option<&AtomicBool>,
     ) -> Report {
-        self.rise(&self.lengths(displacements), work, stop)
+        let report = self.rise(&self.lengths(displacements), work, stop);
+        self.report_fault(work);
+        report
     }
 
     fn rise(&self, wanted: &TendonTarget, work: &mut Scratch, stop: Option<&AtomicBool>) -> Report {
@@ -267,6 +290,8 @@ impl<'r> LoadedRod<'r> {
 }
 
 impl Model for LoadedRod<'_> {
+    const NAME: &'static str = Rod::NAME;
+
     type Scratch = Scratch;
 
     fn robot(&self) -> &Robot {
@@ -297,10 +322,56 @@ impl Model for LoadedRod<'_> {
             self.climb(&wanted, Some(&from), work, budget, self.rod.stop.as_deref())
         });
         let over = work.fault.is_some() || work.ending == Ending::Stopped;
+        self.report_fault(work);
         if report.status == Status::Converged || over {
             return Ok(report);
         }
         self.solve(displacements, work)
+    }
+
+    /// Solves for displacements from the strains and tensions of an earlier shape of this robot with as many
+    /// elements, under the whole loads from the first step on; a start that does not help is dropped.
+    ///
+    /// # Errors
+    /// `InvalidInput` for a start with another number of strains.
+    fn solve_from(
+        &self,
+        start: &State,
+        displacements: &[f64],
+        work: &mut Scratch,
+    ) -> Result<Report, InvalidInput> {
+        let plan = self.plan();
+        self.begin(work);
+        let Descent { here, estimates, .. } = &mut work.descent;
+        read_state(start, plan, &mut here.strains, &mut estimates.tensions)?;
+        let own = estimates.tensions.iter().zip(&plan.compliance);
+        let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, give))| l - t * give);
+        work.kept.given = Some(TendonTarget::Lengths(from.collect()));
+        // A fault comes again, and is told, where the shape is evaluated.
+        if self.sink(work).is_err() {
+            work.sunk = None;
+        }
+        work.ending = Ending::Converged;
+        self.recall(start, work);
+        self.resume(displacements, work)
+    }
+
+    /// The shape under given tensions, in the unit of the results: displacements are then what it has
+    /// ([`Self::displacements`]). Tensions, loads and contacts grow together from rest.
+    ///
+    /// # Errors
+    /// `InvalidInput` for another number of tensions, or one that is negative or not finite.
+    fn solve_tensions(&self, tensions: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
+        self.plan().check_tensions(tensions)?;
+        let tensions = tensions.iter().map(|tension| tension / self.plan().unit).collect();
+        let report = self.rise(&TendonTarget::Tensions(tensions), work, self.rod.stop.as_deref());
+        self.report_fault(work);
+        Ok(report)
+    }
+
+    /// Displacements under which a shape has the lengths and tensions that it has; see [`Rod::displacements`].
+    fn displacements(&self, state: &State) -> Vec<f64> {
+        self.rod.displacements(state)
     }
 
     fn state<'w>(&self, work: &'w Scratch) -> &'w State {

@@ -27,6 +27,26 @@ const SAME: f64 = 1e-9;
 const OPPOSED: f64 = -0.5;
 
 /// Obstacles and loads around a robot.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::obstacle::{HalfSpace, Obstacle};
+/// use tdcr::rod::contact::Scene;
+/// use tdcr::rod::{Plan, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// let plan = Plan::new(&robot, RodSettings::default())?;
+/// let wall = HalfSpace::new(&Vector3::new(0.03, 0.0, 0.0), &-Vector3::x())?;
+/// // One wall, no loads, a body of 5 mm radius around the backbone.
+/// let scene = Scene::new(&robot, &plan, &[Obstacle::new(wall, false)], None, 0.005)?;
+/// # drop(scene);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub(super) obstacles: Vec<Obstacle>,

@@ -81,14 +81,13 @@ impl<'r> ContactRod<'r> {
             grown: vec![Vec::new(); count],
         };
         leaning.rest = leaning.set_out(&vec![0.0; count]);
-        leaning.rest();
+        leaning.reset();
         leaning
     }
 
     /// Climbs from the undeformed robot, without loads; where that leads.
     fn set_out(&mut self, tensions: &[f64]) -> Point {
         let Self { rod, work, .. } = self;
-        work.fault = None;
         rod.begin(work);
         let mut budget = rod.plan().settings.max_iterations;
         let given = TendonTarget::Tensions(tensions.to_vec());
@@ -101,6 +100,7 @@ impl<'r> ContactRod<'r> {
     fn arrived(&mut self, led: Result<(), Fault>, tensions: Vec<f64>) -> Point {
         if let Err(fault) = led {
             self.work.fault = Some(fault);
+            self.rod.report_fault(&mut self.work);
             return Point::default();
         }
         let sound = self.work.ending == Ending::Converged;
@@ -131,7 +131,7 @@ impl<'r> ContactRod<'r> {
 }
 
 impl Equilibrium for ContactRod<'_> {
-    fn rest(&mut self) {
+    fn reset(&mut self) {
         for point in &mut self.points {
             point.sound = false;
         }
@@ -139,8 +139,8 @@ impl Equilibrium for ContactRod<'_> {
         (self.at, self.held) = (0, false);
     }
 
-    fn begin(&mut self, start: &State) -> bool {
-        self.rest();
+    fn start_from(&mut self, start: &State) -> bool {
+        self.reset();
         let (rod, work) = (&self.rod, &mut self.work);
         rod.begin(work);
         let (strains, mut tensions) =
@@ -164,7 +164,7 @@ impl Equilibrium for ContactRod<'_> {
         &self.points[self.at].tensions
     }
 
-    fn go(&mut self, tensions: &[f64]) -> bool {
+    fn solve_at(&mut self, tensions: &[f64]) -> bool {
         let away = self.points.each_ref().map(|point| point.away(tensions));
         let nearest = (0..POINTS).fold(0, |best, k| if away[k] < away[best] { k } else { best });
         if away[nearest] == 0.0 && nearest == self.at && self.held {
@@ -244,21 +244,17 @@ impl Equilibrium for ContactRod<'_> {
         self.grown[by][k] - give
     }
 
-    fn keep(&mut self, place: usize) {
+    fn save(&mut self, place: usize) {
         self.kept[place] = self.points[self.at].clone();
     }
 
-    fn go_back(&mut self, place: usize) {
-        self.rest();
+    fn restore(&mut self, place: usize) {
+        self.reset();
         self.points[0].clone_from(&self.kept[place]);
     }
 
     fn state(&mut self) -> Option<State> {
         self.held.then(|| self.rod.written(&mut self.work).clone())
-    }
-
-    fn take_fault(&mut self) -> Option<Fault> {
-        self.work.fault.take()
     }
 }
 

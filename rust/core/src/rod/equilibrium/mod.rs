@@ -1,10 +1,11 @@
-//! The rod as a smooth function of its tensions: what an inverse descends on.
+//! Equilibrium of the rod as a smooth function of its tensions, which an inverse descends on.
 //!
-//! Given tensions there is a balance near the ones before, so that no set of displacements is infeasible and no
+//! Given tensions there is an equilibrium near the ones before, so that no set of displacements is infeasible and no
 //! tendon slack.
 
 mod contact;
 mod free;
+mod memory;
 
 use std::fmt::Debug;
 
@@ -12,7 +13,6 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::lie::Pose;
 use crate::model::State;
-use crate::obstacle::Fault;
 
 pub(crate) use contact::ContactRod;
 pub(crate) use free::FreeRod;
@@ -20,68 +20,63 @@ pub(crate) use free::FreeRod;
 /// A velocity and an angular velocity.
 pub(crate) type Twist = (Vector3<f64>, Vector3<f64>);
 
-/// A robot that goes from one balance under tensions to the next. Tensions are in the plan's unit.
+/// Robot that is solved at one set of tensions after another. Tensions are in the plan's unit.
 pub(crate) trait Equilibrium: Debug {
     /// Forgets all but the shape without tensions, so that what follows does not depend on what went before.
-    fn rest(&mut self);
+    fn reset(&mut self);
 
-    /// Puts a shape with its tensions in place of that; false when it is no balance.
-    fn begin(&mut self, start: &State) -> bool;
+    /// Starts from a shape with its tensions instead; false when it is no equilibrium.
+    fn start_from(&mut self, start: &State) -> bool;
 
-    /// Tensions of the balance at hand.
+    /// Tensions of the equilibrium at hand.
     fn tensions(&self) -> &[f64];
 
-    /// Goes to the balance under tensions; false when none is found from the nearest known one.
-    fn go(&mut self, tensions: &[f64]) -> bool;
+    /// Solves for the equilibrium under tensions; false when none is found from the nearest known one.
+    fn solve_at(&mut self, tensions: &[f64]) -> bool;
 
-    /// Finds how the balance at hand moves.
+    /// Differentiates the equilibrium at hand by the tensions.
     fn differentiate(&mut self);
 
-    /// What [`Self::differentiate`] found last.
+    /// Motion that [`Self::differentiate`] found last.
     fn motion(&self) -> &Motion;
 
-    /// The same, for [`Motion::curve`].
+    /// Mutable motion, for [`Motion::curve`].
     fn motion_mut(&mut self) -> &mut Motion;
 
     /// Change of a tendon's own length from rest, without what its tension stretches it by \[m\].
     fn displacement(&self, k: usize) -> f64;
 
-    /// Its derivative by a tension.
+    /// Derivative of a displacement by a tension.
     fn displacement_slope(&self, k: usize, by: usize) -> f64;
 
-    /// Keeps the balance at hand in one of three places for [`Self::go_back`]: tensions do not always say which one
-    /// it is.
-    fn keep(&mut self, place: usize);
+    /// Saves the equilibrium at hand in one of three slots for [`Self::restore`]: tensions do not always determine
+    /// which one it is.
+    fn save(&mut self, slot: usize);
 
-    /// Puts the balance that was kept in place of that at rest.
-    fn go_back(&mut self, place: usize);
+    /// Starts from the equilibrium that was saved in a slot, instead of rest.
+    fn restore(&mut self, slot: usize);
 
-    /// The shape at hand, where tensions do not say which one it is.
+    /// Shape at hand, where tensions do not determine which one it is.
     fn state(&mut self) -> Option<State> {
-        None
-    }
-
-    /// What a function of an obstacle ended the work with, if it did.
-    fn take_fault(&mut self) -> Option<Fault> {
         None
     }
 }
 
-/// Where the tool is at a balance, and how tensions move it.
+/// Pose of the tool at an equilibrium, and its rates by the tensions.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
     /// The tool in the base's frame.
     pub(crate) tool: Pose,
     /// Velocity of the tool and angular velocity by every tension, in the base's axes.
     pub(crate) columns: Vec<Twist>,
-    /// Place of every disk from the first, in the base's frame.
+    /// Position of every disk from the first, in the base's frame.
     pub(crate) disks: Vec<Vector3<f64>>,
-    /// Where the tool is taken to be in the velocities.
+    /// Point of the tool that the velocities are those of.
     point: Vector3<f64>,
-    /// Every subsegment's shares of them, with the tendon, and where each subsegment's end.
+    /// Every subsegment's shares of them, with the tendon, and the end of those of each subsegment.
     shares: Vec<(usize, Twist)>,
     ends: Vec<usize>,
-    /// Angular velocities of the subsegment's middle that is looked at.
+    /// Angular velocities of the middle of the subsegment at hand.
     spins: Vec<Vector3<f64>>,
 }
 
@@ -108,14 +103,14 @@ impl Motion {
         self.ends.clear();
     }
 
-    /// Adds what a tension moves the tool by in the subsegment at hand.
+    /// Adds the share of the subsegment at hand in the tool's rate by a tension.
     pub(super) fn add(&mut self, tendon: usize, share: Twist) {
         let sum = &mut self.columns[tendon];
         *sum = (sum.0 + share.0, sum.1 + share.1);
         self.shares.push((tendon, share));
     }
 
-    /// On to the next subsegment.
+    /// Ends the shares of the subsegment at hand.
     pub(super) fn next(&mut self) {
         self.ends.push(self.shares.len());
     }
@@ -162,7 +157,7 @@ impl Motion {
         self.turn(turned, |_, share| share.1.cross(moment));
     }
 
-    /// The same of the disks' places times a force on each, summed.
+    /// Second derivatives of the disks' positions times a force on each, summed, by two tensions.
     pub(crate) fn curve_places(&mut self, forces: &[Vector3<f64>], moved: &mut Vec<f64>) {
         // Of all forces beyond every subsegment, with `(w × d) × f = d (w · f) − w (d · f)`.
         let mut beyond = vec![(Vector3::zeros(), Matrix3::zeros()); forces.len()];

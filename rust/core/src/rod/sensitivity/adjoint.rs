@@ -1,4 +1,4 @@
-//! Gradients of what a shape is used for, by everything that it was made of.
+//! Adjoint: gradients of what a shape is used for, by everything that it was made of.
 
 use nalgebra::{DVector, Vector3, Vector6};
 
@@ -17,6 +17,7 @@ impl Sensitivity<'_> {
         }
     }
 
+    /// Adjoint for `D` unknowns per element: weights f of the disks are summed into y, then one solve.
     fn adjoint_of<const D: usize>(
         &self,
         positions: &[Vector3<f64>],
@@ -27,7 +28,8 @@ impl Sensitivity<'_> {
         let mut out = self.no_change();
         let mut local = Local::default();
         let mut right = vec![0.0; self.at.strains.len()];
-        // Force and moment about the world's origin of all that lies beyond.
+        // y: f summed from the tip into forces and moments on the strains. `wrench`: force and moment about the world's
+        // origin of all that lies beyond.
         let mut wrench = Vector6::zeros();
         for i in (0..n).rev() {
             let at = self.at.frames[i + 1].translation;
@@ -40,6 +42,7 @@ impl Sensitivity<'_> {
                 moment.y,
                 moment.z,
             );
+            // In the axes of the base disk.
             let base = &self.at.frames[i];
             let force: Vector3<f64> = wrench.fixed_rows::<3>(0).into();
             let about: Vector3<f64> = wrench.fixed_rows::<3>(3).into();
@@ -56,8 +59,10 @@ impl Sensitivity<'_> {
                         node.sweep[c].dot(&force) + node.spin[c].dot(&about);
                 }
             }
+            // f·∂p/∂q: lengths move the disks at fixed strains.
             out.lengths[i] += local.end().translation.dot(&force) / plan.length(i);
         }
+        // t = S⁻¹ A H⁻¹ y, x* = H⁻¹ (y − Aᵀ t).
         let mut lengths = DVector::zeros(self.at.count);
         self.solve(&mut right, &mut lengths);
         self.contract::<D>(&right, &lengths, &mut out);
@@ -75,6 +80,7 @@ impl Sensitivity<'_> {
             let strains = &self.at.strains[i * size..(i + 1) * size];
             let w = &w[i * size..(i + 1) * size];
             local.prepare::<D>(plan.settings.subsegment, data, strains);
+            // −x*·∂g/∂q of the energy.
             let (elasticity, mut stiffness) = (&data.elasticity, StiffnessChange::default());
             for (k, w) in w.iter().enumerate() {
                 let c = k % D;
@@ -86,25 +92,28 @@ impl Sensitivity<'_> {
             }
             out.poisson_ratio += stiffness.shear / (1.0 + self.poisson_ratio());
             let mut share = stiffness.length;
+            // −x*·∂g/∂q of the tensions' work, and t·∂(b − L)/∂q.
             for p in plan.starts[i]..plan.starts[i + 1] {
                 let piece = &plan.pieces[p];
-                let pull = self.at.equations[p].map_or(0.0, |row| t[row]);
+                let multiplier = self.at.equations[p].map_or(0.0, |row| t[row]);
                 let at = Line::new(&local, piece);
-                let by = at.gradient::<D>(&local, w, self.at.tensions[p], pull);
+                let by = at.gradient::<D>(&local, w, self.at.tensions[p], multiplier);
                 out.holes[piece.tendon][i] += by.from;
                 out.holes[piece.tendon][i + 1] += by.to;
                 share += by.share;
                 if self.at.equations[p].is_some() {
                     let bound = self.piece_bound(p);
-                    let by = plan.settings.tendons.bound_weights(&bound, pull);
+                    let by = plan.settings.tendons.bound_weights(&bound, multiplier);
                     weights[p] += by.piece;
                     whole[piece.tendon] += by.tendon;
                     out.displacements[piece.tendon] += by.displacement;
                     out.stiffness[piece.tendon] -= by.strain * bound.strain;
                 }
             }
+            // Lengths: by the stiffness, and by the holes that they move.
             out.lengths[i] += share / plan.length(i);
         }
+        // ∂b/∂q by the rest lengths of the pieces.
         for (weight, piece) in weights.iter_mut().zip(&plan.pieces) {
             *weight += whole[piece.tendon];
         }
@@ -145,13 +154,13 @@ struct ByPiece {
 }
 
 impl Line {
-    /// Of `−tension w·d(∂L/∂w) − pull dL`.
+    /// Gradient of `−tension w·d(∂L/∂w) − multiplier dL`.
     fn gradient<const D: usize>(
         &self,
         local: &Local,
         w: &[f64],
         tension: f64,
-        pull: f64,
+        multiplier: f64,
     ) -> ByPiece {
         let (u, end) = (self.direction, local.end());
         let (mut velocity, mut levers, mut share) = (Vector3::zeros(), Vector3::zeros(), 0.0);
@@ -168,7 +177,7 @@ impl Line {
             share -= tension * u.dot(&swept);
         }
         let across = velocity - u * u.dot(&velocity);
-        let by_line = across * (-tension / self.length) - u * pull;
+        let by_line = across * (-tension / self.length) - u * multiplier;
         share += end.translation.dot(&by_line);
         ByPiece { from: -by_line, to: end.rotation.tr_mul(&(by_line + levers)), share }
     }

@@ -15,34 +15,79 @@ use super::model::{Rod, Scratch};
 use super::plan::Plan;
 use super::subsegment::{Local, Piece};
 use super::tendon_law::{Equations, PieceBound};
-use super::tip_rates::{Solved, Sweep};
+use super::tip_rates::{SolvedRod, TipRates};
 use crate::lie::Pose;
 use crate::solve::dense::{backward, dot, forward};
 use crate::solve::pseudo_inverse::PseudoInverse;
 
-/// A change of what a rod is made of, or a gradient by it.
+/// Change q of what a rod is made of, or a gradient by it.
+///
+/// ```
+/// # use tdcr::model::Model;
+/// # use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, RodSettings::default())?;
+/// # let rod = Rod::new(&robot, &plan);
+/// # let mut scratch = Scratch::default();
+/// let displacements = [-0.005, f64::INFINITY, f64::INFINITY];
+/// rod.solve(&displacements, &mut scratch)?;
+/// let sensitivity = rod.sensitivity(&displacements, &scratch);
+/// let zero = sensitivity.no_change();
+/// // No change of anything moves nothing.
+/// assert_eq!(sensitivity.forward(&zero).velocities[10].norm(), 0.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// Of each displacement \[m\].
+    /// Change of each displacement \[m\].
     pub displacements: Vec<f64>,
-    /// Of each subsegment's rest rotation vector \[rad\].
+    /// Change of each subsegment's rest rotation vector \[rad\].
     pub rest: Vec<Vector3<f64>>,
-    /// Of each tendon's holes, disk 0 to its end, in the disks' frames \[m\].
+    /// Change of each tendon's holes, disk 0 to its end, in the disks' frames \[m\].
     pub holes: Vec<Vec<Vector3<f64>>>,
-    /// Of each subsegment's length, its stiffness per length unchanged \[m\].
+    /// Change of each subsegment's length, its stiffness per length unchanged \[m\].
     pub lengths: Vec<f64>,
-    /// Of Poisson's ratio.
+    /// Change of Poisson's ratio.
     pub poisson_ratio: f64,
     /// Relative change of each tendon's stiffness EA; nothing where tendons do not stretch.
     pub stiffness: Vec<f64>,
 }
 
-/// What a change does to the shape.
+/// Variation of the shape by a change.
+///
+/// ```
+/// # use tdcr::model::Model;
+/// # use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, RodSettings::default())?;
+/// # let rod = Rod::new(&robot, &plan);
+/// # let mut scratch = Scratch::default();
+/// let displacements = [-0.005, f64::INFINITY, f64::INFINITY];
+/// rod.solve(&displacements, &mut scratch)?;
+/// let sensitivity = rod.sensitivity(&displacements, &scratch);
+/// let zero = sensitivity.no_change();
+/// let change = Change { displacements: vec![1.0, 0.0, 0.0], ..zero };
+/// let variation = sensitivity.forward(&change);
+/// assert_eq!((variation.strains.len(), variation.spins.len()), (3 * 10, 11));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variation {
-    /// Of every element's strain: rotation vector, and elongation where there is one.
+    /// Rate of every element's strain: rotation vector, and elongation where there is one.
     pub strains: Vec<f64>,
-    /// Of each tension, in the unit of the results; of the base piece where displacements are proportional.
+    /// Rate of each tension, in the unit of the results; of the base piece where displacements are proportional.
     pub tensions: Vec<f64>,
     /// Velocity of each disk's centre, world axes \[m\].
     pub velocities: Vec<Vector3<f64>>,
@@ -52,17 +97,41 @@ pub struct Variation {
 
 /// Lengths within this share of their bounds are at them.
 const AT_BOUND: f64 = 1e-9;
-/// What a tendon can do to the shape, as a share of what it could from holes a piece's length away, squared,
-/// when it is rounding.
+/// Leverage of a tendon on the shape that is rounding, squared, as a share of that from holes a piece's length away.
 const LEVERLESS: f64 = 1e-24;
 
-/// A solved rod as its derivatives need it: factored, and without the robot.
+/// Solved rod, linearized: factored, and without the robot.
+///
+/// ```
+/// use std::sync::Arc;
+/// # use tdcr::model::Model;
+/// # use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, RodSettings::default())?;
+/// # let rod = Rod::new(&robot, &plan);
+/// # let mut scratch = Scratch::default();
+/// let displacements = [-0.005, f64::INFINITY, f64::INFINITY];
+/// rod.solve(&displacements, &mut scratch)?;
+/// let sensitivity = rod.sensitivity(&displacements, &scratch);
+/// let zero = sensitivity.no_change();
+/// // Kept without the robot, for as long as its derivatives are wanted.
+/// let kept: Arc<tdcr::rod::Linearized> = sensitivity.linearized();
+/// let again = rod.sensitivity_at(kept);
+/// assert_eq!(again.forward(&zero).tensions, sensitivity.forward(&zero).tensions);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Linearized {
     displacements: Vec<f64>,
     strains: Vec<f64>,
     factors: Vec<f64>,
-    images: Vec<f64>,
+    whitened_rows: Vec<f64>,
     frames: Vec<Pose>,
     /// Tension of every piece, in the plan's unit.
     tensions: Vec<f64>,
@@ -74,7 +143,31 @@ pub struct Linearized {
     dependent: bool,
 }
 
-/// The derivatives of one solved shape.
+/// Derivatives of one solved shape.
+///
+/// ```
+/// # use tdcr::model::Model;
+/// # use tdcr::rod::{Change, Plan, Rod, RodSettings, Scratch};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
+/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
+/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
+/// # let plan = Plan::new(&robot, RodSettings::default())?;
+/// # let rod = Rod::new(&robot, &plan);
+/// # let mut scratch = Scratch::default();
+/// let displacements = [-0.005, f64::INFINITY, f64::INFINITY];
+/// rod.solve(&displacements, &mut scratch)?;
+/// let sensitivity = rod.sensitivity(&displacements, &scratch);
+/// let zero = sensitivity.no_change();
+/// // Tip velocity per metre of each displacement.
+/// let change = Change { displacements: vec![1.0, 0.0, 0.0], ..zero };
+/// let variation = sensitivity.forward(&change);
+/// assert!(variation.velocities[10].x < 0.0);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Sensitivity<'r> {
     rod: Rod<'r>,
@@ -84,16 +177,16 @@ pub struct Sensitivity<'r> {
 impl<'r> Rod<'r> {
     /// Derivatives at the shape that the last solve for `displacements` left in `work`.
     ///
-    /// Tendons under tension or exactly at their bounds count as taut; a bound that rest just meets is so
-    /// followed on its pulled side. Where taut tendons depend on each other, displacements cannot change one
+    /// Tendons under tension or exactly at their bounds count as active; a bound that rest just meets is so
+    /// followed on its pulled side. Where active tendons depend on each other, displacements cannot change one
     /// by one: the derivatives are then those of the nearest change that the rod can follow.
     #[must_use]
     pub fn sensitivity(&self, displacements: &[f64], work: &Scratch) -> Sensitivity<'r> {
         let mut at = Linearized {
             displacements: displacements.to_vec(),
-            strains: work.chain.strains.clone(),
+            strains: work.system.strains.clone(),
             factors: Vec::new(),
-            images: Vec::new(),
+            whitened_rows: Vec::new(),
             frames: work.state.frames.clone(),
             tensions: Vec::new(),
             equations: Vec::new(),
@@ -116,42 +209,46 @@ impl<'r> Rod<'r> {
 }
 
 impl Linearized {
+    /// Takes factors and rows from a solve with one equation per tendon.
     fn assemble_whole(&mut self, plan: &Plan, work: &Scratch) {
-        let chain = &work.chain;
-        self.factors.clone_from(&chain.factors);
-        self.images.clone_from(&chain.images);
-        self.tensions = plan.pieces.iter().map(|p| chain.tensions[p.tendon]).collect();
-        let tendons = chain.bounds.len();
-        let taut: Vec<usize> = (0..tendons)
+        let system = &work.system;
+        self.factors.clone_from(&system.factors);
+        self.whitened_rows.clone_from(&system.whitened_rows);
+        self.tensions = plan.pieces.iter().map(|p| system.tensions[p.tendon]).collect();
+        let tendons = system.bounds.len();
+        // Tendons that count: under tension, or at their bounds.
+        let active: Vec<usize> = (0..tendons)
             .filter(|k| {
-                chain.bounds[*k].is_finite()
-                    && (chain.tensions[*k] > 0.0
-                        || chain.over[*k].abs() <= AT_BOUND * plan.rest_lengths[*k])
+                system.bounds[*k].is_finite()
+                    && (system.tensions[*k] > 0.0
+                        || system.length_error[*k].abs() <= AT_BOUND * plan.rest_lengths[*k])
             })
             .collect();
         // One that crosses sides has no first derivative at rest: rounding is none.
-        let mut most = vec![0.0; tendons];
+        let mut leverage = vec![0.0; tendons];
         for (i, data) in plan.data.iter().enumerate() {
             for p in plan.starts[i]..plan.starts[i + 1] {
                 let length = plan.piece_lengths[p];
-                most[plan.pieces[p].tendon] += length * length / data.elasticity.bending();
+                leverage[plan.pieces[p].tendon] += length * length / data.elasticity.bending();
             }
         }
-        let count = taut.len();
-        let taut: Vec<usize> = taut
+        let count = active.len();
+        let active: Vec<usize> = active
             .into_iter()
-            .filter(|k| chain.schur[k * (tendons + 1)] > LEVERLESS * most[*k])
+            .filter(|k| system.schur[k * (tendons + 1)] > LEVERLESS * leverage[*k])
             .collect();
-        self.dependent |= taut.len() < count;
+        self.dependent |= active.len() < count;
         self.equations =
-            plan.pieces.iter().map(|p| taut.iter().position(|k| *k == p.tendon)).collect();
-        let schur = DMatrix::from_fn(taut.len(), taut.len(), |a, b| {
-            let (a, b) = (taut[a.max(b)], taut[a.min(b)]);
-            chain.schur[a * tendons + b]
+            plan.pieces.iter().map(|p| active.iter().position(|k| *k == p.tendon)).collect();
+        // S of these.
+        let schur = DMatrix::from_fn(active.len(), active.len(), |a, b| {
+            let (a, b) = (active[a.max(b)], active[a.min(b)]);
+            system.schur[a * tendons + b]
         });
         self.push_group(&schur);
     }
 
+    /// Adds equations that share unknowns, with their S⁻¹ (its pseudo-inverse where they are dependent).
     fn push_group(&mut self, schur: &DMatrix<f64>) {
         let inverse = PseudoInverse::new(schur);
         self.dependent |= inverse.rank < schur.nrows();
@@ -159,8 +256,9 @@ impl Linearized {
         self.count += schur.nrows();
     }
 
+    /// Takes factors and rows of every subsegment, with one equation per piece.
     fn assemble_pieces(&mut self, plan: &Plan, work: &Scratch) {
-        let mut chain = work.part.clone();
+        let mut system = work.part.clone();
         // One that is held at the length that it has at rest drives as soon as it is pulled.
         let lengths = work.state.tendon_lengths.iter().zip(&plan.rest_lengths);
         let held: Vec<bool> = lengths
@@ -168,27 +266,29 @@ impl Linearized {
             .map(|((own, rest), d)| *d == 0.0 && (own - rest).abs() <= AT_BOUND * rest)
             .collect();
         for (i, part) in plan.parts.iter().enumerate() {
-            work.load_part(plan, i, &self.displacements, &mut chain);
+            work.load_part(plan, i, &self.displacements, &mut system);
             let range = plan.starts[i]..plan.starts[i + 1];
             for (k, (piece, rest)) in
                 plan.pieces[range.clone()].iter().zip(&plan.piece_lengths[range]).enumerate()
             {
                 if held[piece.tendon] {
-                    (chain.bounds[k], chain.taut[k]) = (*rest, true);
+                    (system.bounds[k], system.active[k]) = (*rest, true);
                 }
             }
-            chain.give = 0.0;
-            chain.assemble(part, f64::INFINITY);
-            self.factors.extend_from_slice(&chain.factors);
-            self.images.extend_from_slice(&chain.images);
-            self.tensions.extend_from_slice(&chain.tensions);
-            let count = chain.bounds.len();
-            let taut: Vec<usize> = (0..count).filter(|k| chain.taut[*k]).collect();
+            // Factors and rows at the shape as it is.
+            system.added_compliance = 0.0;
+            system.assemble(part, f64::INFINITY);
+            self.factors.extend_from_slice(&system.factors);
+            self.whitened_rows.extend_from_slice(&system.whitened_rows);
+            self.tensions.extend_from_slice(&system.tensions);
+            let count = system.bounds.len();
+            // Equations of the pieces that count, a group of their own.
+            let active: Vec<usize> = (0..count).filter(|k| system.active[*k]).collect();
             let first = self.count;
-            let place = |k| taut.iter().position(|own| *own == k).map(|a| first + a);
-            self.equations.extend((0..count).map(place));
-            let schur = DMatrix::from_fn(taut.len(), taut.len(), |a, b| {
-                chain.schur[taut[a.max(b)] * count + taut[a.min(b)]]
+            let equation = |k| active.iter().position(|own| *own == k).map(|a| first + a);
+            self.equations.extend((0..count).map(equation));
+            let schur = DMatrix::from_fn(active.len(), active.len(), |a, b| {
+                system.schur[active[a.max(b)] * count + active[a.min(b)]]
             });
             self.push_group(&schur);
         }
@@ -196,13 +296,13 @@ impl Linearized {
 }
 
 impl Sensitivity<'_> {
-    /// Whether taut tendons depend on each other.
+    /// Dependence of active tendons on each other.
     #[must_use]
     pub fn dependent(&self) -> bool {
         self.at.dependent
     }
 
-    /// What it was made of, to be kept without the robot.
+    /// Linearized rod, to be kept without the robot.
     #[must_use]
     pub fn linearized(&self) -> Arc<Linearized> {
         Arc::clone(&self.at)
@@ -220,25 +320,28 @@ impl Sensitivity<'_> {
     fn solve(&self, right: &mut [f64], lengths: &mut DVector<f64>) {
         let plan = self.plan();
         let size = plan.width();
+        // A H⁻¹ right − lengths.
         lengths.neg_mut();
         for (i, own) in right.chunks_exact_mut(size).enumerate() {
             forward(&self.at.factors[i * size * size..(i + 1) * size * size], size, own);
             for p in plan.starts[i]..plan.starts[i + 1] {
                 if let Some(row) = self.at.equations[p] {
-                    lengths[row] += dot(&self.at.images[p * size..(p + 1) * size], own);
+                    lengths[row] += dot(&self.at.whitened_rows[p * size..(p + 1) * size], own);
                 }
             }
         }
+        // t = S⁻¹ of that.
         for (first, inverse) in &self.at.groups {
             let solved = inverse * lengths.rows(*first, inverse.nrows());
             lengths.rows_mut(*first, inverse.nrows()).copy_from(&solved);
         }
+        // w = H⁻¹ (right − Aᵀ t).
         for (i, own) in right.chunks_exact_mut(size).enumerate() {
             for p in plan.starts[i]..plan.starts[i + 1] {
                 if let Some(row) = self.at.equations[p] {
-                    let image = &self.at.images[p * size..(p + 1) * size];
-                    for (w, y) in own.iter_mut().zip(image) {
-                        *w -= lengths[row] * y;
+                    let whitened = &self.at.whitened_rows[p * size..(p + 1) * size];
+                    for (w, a) in own.iter_mut().zip(whitened) {
+                        *w -= lengths[row] * a;
                     }
                 }
             }
@@ -275,18 +378,18 @@ impl Sensitivity<'_> {
         let size = plan.width();
         let point = self.at.frames[plan.data.len()].transform(&tool.translation);
         let mut by_equation = Matrix6xX::zeros(self.at.count);
-        let at = Solved {
+        let at = SolvedRod {
             strains: &self.at.strains,
             factors: &self.at.factors,
             frames: &self.at.frames,
         };
-        Sweep::default().run::<D>(plan, &at, &point, |i, rows| {
+        TipRates::default().for_each_subsegment::<D>(plan, &at, &point, |i, rows| {
             for p in plan.starts[i]..plan.starts[i + 1] {
                 if let Some(equation) = self.at.equations[p] {
-                    let image = &self.at.images[p * size..(p + 1) * size];
+                    let whitened = &self.at.whitened_rows[p * size..(p + 1) * size];
                     let mut column = by_equation.column_mut(equation);
                     for (k, row) in rows.chunks_exact(size).enumerate() {
-                        column[k] += dot(row, image);
+                        column[k] += dot(row, whitened);
                     }
                 }
             }
@@ -313,7 +416,7 @@ impl Sensitivity<'_> {
         out
     }
 
-    /// No change.
+    /// Change of nothing.
     #[must_use]
     pub fn no_change(&self) -> Change {
         let n = self.plan().data.len();
@@ -330,7 +433,7 @@ impl Sensitivity<'_> {
     }
 }
 
-/// A tendon between two disks.
+/// Tendon between two disks.
 struct Line {
     point: Vector3<f64>,
     direction: Vector3<f64>,

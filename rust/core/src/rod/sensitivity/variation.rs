@@ -1,4 +1,4 @@
-//! What a change does to a shape.
+//! Variation of a shape by a change of what it is made of.
 
 use nalgebra::{DVector, Vector3};
 
@@ -8,7 +8,7 @@ use crate::rod::subsegment::Local;
 use crate::rod::tendon_law::BoundRate;
 
 impl Sensitivity<'_> {
-    /// What a change does to the shape, its sizes those of [`Sensitivity::no_change`].
+    /// Variation of the shape by a change, its sizes those of [`Sensitivity::no_change`].
     #[must_use]
     pub fn forward(&self, change: &Change) -> Variation {
         match self.plan().unknowns() {
@@ -17,12 +17,14 @@ impl Sensitivity<'_> {
         }
     }
 
+    /// Variation for `D` unknowns per element: −dg and −dr at fixed strains and tensions, then one solve.
     fn forward_of<const D: usize>(&self, change: &Change) -> Variation {
         let plan = self.plan();
         let size = plan.width();
         let mut local = Local::default();
         let mut right = vec![0.0; self.at.strains.len()];
         let mut lengths = DVector::zeros(self.at.count);
+        // Changes of the rest lengths, of the pieces and of whole tendons.
         let rest = self.rest_change::<D>(change);
         let mut whole = vec![0.0; self.at.displacements.len()];
         for (piece, change) in plan.pieces.iter().zip(&rest) {
@@ -32,6 +34,7 @@ impl Sensitivity<'_> {
             let strains = &self.at.strains[i * size..(i + 1) * size];
             local.prepare::<D>(plan.settings.subsegment, data, strains);
             let share = change.lengths[i] / plan.length(i);
+            // −dg of the energy.
             let own = &mut right[i * size..(i + 1) * size];
             let count = plan.settings.elements as f64;
             let shear = change.poisson_ratio / (1.0 + self.poisson_ratio());
@@ -43,6 +46,7 @@ impl Sensitivity<'_> {
                     *own += data.elasticity.moment_by_rest(c, change.rest[i][c]) / count;
                 }
             }
+            // −dg of the tensions' work: the direction u turns, and the hole's velocity changes.
             for p in plan.starts[i]..plan.starts[i + 1] {
                 let piece = &plan.pieces[p];
                 let holes = &change.holes[piece.tendon];
@@ -52,6 +56,7 @@ impl Sensitivity<'_> {
                 let turned = end.rotation * to;
                 let moved = end.translation * share + turned - from;
                 let direction = (moved - at.direction * at.direction.dot(&moved)) / at.length;
+                // Lever and velocity of the hole, element by element.
                 for (e, node) in local.nodes.iter().enumerate() {
                     let lever = at.point - node.end.translation;
                     let shifted = (end.translation - node.end.translation) * share + turned;
@@ -62,6 +67,7 @@ impl Sensitivity<'_> {
                         own[D * e + c] -= self.at.tensions[p] * slope;
                     }
                 }
+                // −dr = db − dL.
                 if let Some(row) = self.at.equations[p] {
                     lengths[row] -= at.direction.dot(&moved);
                     let bound = self.piece_bound(p);
@@ -75,6 +81,7 @@ impl Sensitivity<'_> {
                 }
             }
         }
+        // H dx + Aᵀ dT = −dg, A dx − C dT = −dr.
         self.solve(&mut right, &mut lengths);
         self.variation::<D>(right, &lengths, change)
     }
@@ -105,10 +112,11 @@ impl Sensitivity<'_> {
         out
     }
 
+    /// Variation of strains, tensions and disks from the solved dx and dT.
     fn variation<const D: usize>(
         &self,
         strains: Vec<f64>,
-        pulls: &DVector<f64>,
+        multipliers: &DVector<f64>,
         change: &Change,
     ) -> Variation {
         let plan = self.plan();
@@ -116,9 +124,10 @@ impl Sensitivity<'_> {
         let mut tensions = vec![0.0; self.at.displacements.len()];
         for p in plan.starts[0]..plan.starts[1] {
             if let Some(row) = self.at.equations[p] {
-                tensions[plan.pieces[p].tendon] = pulls[row] * plan.unit;
+                tensions[plan.pieces[p].tendon] = multipliers[row] * plan.unit;
             }
         }
+        // Velocities of the disks, one after another from the base on.
         let (mut velocity, mut spin) = (Vector3::zeros(), Vector3::zeros());
         let (mut velocities, mut spins) = (vec![velocity], vec![spin]);
         let mut local = Local::default();

@@ -5,10 +5,11 @@
 //! quadratic programming, Nocedal & Wright, *Numerical Optimization*, 2nd ed., section 18.1), and is then
 //! brought back onto the target, so that every point meets it and the energy alone measures progress.
 
-use super::{Ending, Problem, Purpose, Scratch};
+use super::descent::{LeastEnergy, Scratch};
+use super::problem::{Ending, Problem, Purpose};
 use crate::solve::convex_region::Region;
 use crate::solve::dense::dot;
-use crate::solve::quadratic_program::{Outcome, QuadraticProgram, Rows};
+use crate::solve::quadratic_program::Outcome;
 use nalgebra::SVector;
 
 /// No step moves an unknown further.
@@ -28,17 +29,6 @@ const FLOOR: f64 = 1e-6;
 const STATIONARY: f64 = 1e-9;
 /// Energies of order 1 are known to this.
 const ROUNDING: f64 = 1e-14;
-
-/// Buffers of a descent of the energy.
-#[derive(Clone, Debug, Default)]
-pub(super) struct LeastEnergy {
-    energy: f64,
-    gradient: Vec<f64>,
-    next: Vec<f64>,
-    next_gradient: Vec<f64>,
-    program: QuadraticProgram,
-    rows: Rows,
-}
 
 impl<const R: usize> Scratch<R> {
     /// Lowers the energy from `z`, which meets the target: [`Ending::Met`] at a minimum. `z` meets the

@@ -13,6 +13,7 @@ from tdcr._base.arguments import several_obstacles
 from tdcr._base.status import Status
 from tdcr._base.value import Value
 from tdcr._core import Obstacle, PrebendSettings, Robot, clearance, forward
+from tdcr._io.save_load import Saved
 from tdcr.design.targets import wanted_places
 from tdcr.errors import NotConverged
 
@@ -29,7 +30,7 @@ _TOUCH, _SAME = 1e-9, 1e-7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Prebend(Value):
+class Prebend(Saved, Value):
     """A robot designed for a shape, and how it went. Arrays are read-only."""
 
     robot: Robot
@@ -45,7 +46,7 @@ class Prebend(Value):
     the nearest robot that was found, or obstacles stand in the way; others: the rod does not follow
     the displacements."""
     message: str
-    """Message: what stood in the way; when it converged, empty but for disks that `smoothness`
+    """Reason why it did not converge; when it converged, empty but for disks that `smoothness`
     keeps from their places, obstacles that the designed robot rests in and what the solve among
     them says."""
     target_positions: Array
@@ -59,7 +60,7 @@ class Prebend(Value):
 
     @property
     def ok(self) -> bool:
-        """True where it converged."""
+        """True if it converged."""
         return self.status is Status.converged
 
     def require(self) -> Prebend:
@@ -152,6 +153,7 @@ def _among(free: Prebend, obstacles: tuple[Obstacle, ...]) -> Prebend:
     if shape.ok and np.abs(shape.positions - free.shape.positions).max() <= _SAME * length:
         # The same equilibrium, to the accuracy of a solve with contacts: now to the rod's own.
         shape = forward(free.robot, pulls, obstacles=obstacles, settings=rod, start=free.shape)
+    # Distances from the wanted places, and the gap of the shape without obstacles.
     error = np.concatenate(
         [[0.0], np.linalg.norm(shape.positions[1:] - free.target_positions, axis=1)]
     )
@@ -161,7 +163,7 @@ def _among(free: Prebend, obstacles: tuple[Obstacle, ...]) -> Prebend:
     # The solve pulls it out of what it rests in; who builds it has to know.
     rest = forward(free.robot, np.full(len(pulls), np.inf), settings=rod)
     sunk, at = _gap(rest, obstacles, rod.body_radius)
-    # Gaps within rounding touch.
+    # Status and message by the first thing in the way; gaps within rounding touch.
     deep = gap < -_TOUCH * length
     status, parts = Status.converged, []
     if not free.ok:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from tdcr import _core
-from tdcr._base.progress import told
+from tdcr._base.progress import progress_callback
 from tdcr._base.status import Status
 from tdcr._base.value import Value
 from tdcr._core import Robot, RoutingSettings
+from tdcr._io.save_load import Saved
 from tdcr.design.targets import wanted_places
 from tdcr.errors import InvalidInput, NotConverged
 
@@ -26,7 +27,7 @@ __all__ = ["Routing", "routing", "routing_batch"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Routing(Value):
+class Routing(Saved, Value):
     """A robot routed for a shape, and how it went. Arrays are read-only."""
 
     robot: Robot
@@ -43,8 +44,8 @@ class Routing(Value):
     rms: float
     """Root mean square of the distances of disks 1 to n [m]: what is least."""
     relaxed_rms: float
-    """Root mean square of the nearest routing of any azimuth that descents from this one and from
-    simple ones led to [m]: a local minimum, no bound. With `holes=None`, `rms` itself."""
+    """Like `rms`, of the nearest routing of any azimuth that descents from this one and from simple
+    ones led to [m]: a local minimum, no bound. With `holes=None`, `rms` itself."""
     optimality: str
     """reached: every disk is in its place, nothing is nearer; exhaustive: all routings of the one
     tendon were looked at over a row of tensions, between which one may be missed; searched: the
@@ -57,7 +58,7 @@ class Routing(Value):
     """converged: every disk is in its place; unreachable: the nearest that was found; others: the
     rod does not follow the displacements."""
     message: str
-    """Message: what stood in the way; empty when it converged."""
+    """Reason why it did not converge; empty when it converged."""
     target_positions: Array
     """Wanted places of disks 1 to n, (n, 3), world frame [m]."""
     settings: RoutingSettings
@@ -68,12 +69,12 @@ class Routing(Value):
 
     @property
     def gap(self) -> float:
-        """Root mean square by which any azimuth would come nearer, as far as known [m]."""
+        """Distance by which any azimuth comes nearer, by root mean square, as far as known [m]."""
         return self.rms - self.relaxed_rms
 
     @property
     def ok(self) -> bool:
-        """True where it converged."""
+        """True if it converged."""
         return self.status is Status.converged
 
     def require(self) -> Routing:
@@ -138,7 +139,7 @@ def routing(
     KeyboardInterrupt
         On Ctrl-C, within about 0.1 s.
     """
-    settings = _check_settings(robot, settings)
+    settings = _check_arguments(robot, settings)
     pairs = _pairs(robot, bounds)
     before = None
     if start is not None:
@@ -188,17 +189,17 @@ def routing_batch(
     KeyboardInterrupt
         On Ctrl-C, within about 0.1 s.
     """
-    settings = _check_settings(robot, settings)
+    settings = _check_arguments(robot, settings)
     pairs = _pairs(robot, bounds)
     rows = _rows(robot, target_positions, settings.rod.subsegment)
-    with told(progress, "routings", len(rows)) as tell:
+    with progress_callback(progress, "routings", len(rows)) as tell:
         answers = _core._routing_batch(robot, rows, pairs, settings, threads, tell)
     return [
         Routing(*fields, row, settings, pairs) for fields, row in zip(answers, rows, strict=True)
     ]
 
 
-def _check_settings(robot: Robot, settings: RoutingSettings | None) -> RoutingSettings:
+def _check_arguments(robot: Robot, settings: RoutingSettings | None) -> RoutingSettings:
     settings = RoutingSettings() if settings is None else settings
     for name, value, kind in (("robot", robot, Robot), ("settings", settings, RoutingSettings)):
         if not isinstance(value, kind):

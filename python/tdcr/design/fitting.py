@@ -11,7 +11,8 @@ import numpy as np
 from tdcr import _core
 from tdcr._base.status import Status
 from tdcr._base.value import Value
-from tdcr.design.fit_checks import at_bounds, checked, far_off, unsolved, whole
+from tdcr._io.save_load import Saved
+from tdcr.design.fit_checks import at_bounds, check_problem, far_off, unsolved, whole
 from tdcr.design.measurements import Measurements
 from tdcr.errors import InvalidInput, NotConverged
 
@@ -27,7 +28,7 @@ __all__ = ["Fit", "fit"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fit(Value):
+class Fit(Saved, Value):
     """Parameters fitted to measurements, and how well. Arrays are read-only.
 
     Rows without gaps and of finite displacements are the kept ones; all arrays are over these.
@@ -44,7 +45,7 @@ class Fit(Value):
     residuals: Array
     """Measured minus predicted positions, (rows, points, 3) [m]."""
     residuals_before: Array
-    """Measured minus predicted positions of the robot as it was given."""
+    """Residuals with the robot as it was given."""
     rows: NDArray[np.int64]
     """Indices of the kept rows in the measurements."""
     validation: NDArray[np.bool_]
@@ -57,10 +58,10 @@ class Fit(Value):
     status: Status
     """converged, or iteration_limit."""
     message: str
-    """Message: whether steps still fell; how many forward solves failed; whether the root mean
-    square distance of the points fitted to is more than 10 times their median, which outliers make,
-    or more than 5 % of the robot's length: then the model is not of these measurements. Empty if
-    none of these."""
+    """Says if steps still fell; how many forward solves failed; if the root mean square
+    distance of the points fitted to is more than 10 times their median, which outliers make, or
+    more than 5 % of the robot's length: then the model is not of these measurements. Empty if none
+    of these."""
     iterations: int
     """Levenberg-Marquardt steps."""
     seed: int
@@ -70,7 +71,7 @@ class Fit(Value):
 
     @property
     def ok(self) -> bool:
-        """True where it converged."""
+        """True if it converged."""
         return self.status is Status.converged
 
     def require(self) -> Fit:
@@ -117,21 +118,12 @@ class Fit(Value):
         -------
         matplotlib Axes
         """
-        if ax is None:
-            from matplotlib.figure import Figure
+        from tdcr._plot.fit import plot_distances
 
-            ax = Figure(layout="constrained").add_subplot()
         part: Part = "validation" if self.validation.any() else "train"
-        for before, colour, label in ((True, "#9AA5B1", "before"), (False, "#C8553D", "after")):
-            distances = np.sort(self.distances(part, before=before)) * 1e3
-            share = np.arange(len(distances) + 1) / len(distances)
-            label = f"{label}, mean {self.mean(part, before=before) * 1e3:.3g} mm"
-            ax.step([0.0, *distances], share, where="post", color=colour, label=label)
         whose = {"validation": "held-out", "train": "fitted"}[part]
-        ax.set(xlabel="distance [mm]", ylabel=f"share of the {whose} points", ylim=(0, 1.03))
-        ax.grid(True)
-        ax.legend(frameon=False)
-        return ax
+        before, after = (self.distances(part, before=b) for b in (True, False))
+        return plot_distances(before, after, whose, ax)
 
     def plot_residuals(self, axes: Any = None) -> Any:
         """Draw measured minus predicted positions along x, y and z over the rows.
@@ -147,48 +139,11 @@ class Fit(Value):
         -------
         sequence of three matplotlib Axes
         """
-        if axes is None:
-            from matplotlib.figure import Figure
+        from tdcr._plot.fit import plot_residuals
 
-            axes = Figure(figsize=(7.0, 5.5), layout="constrained").subplots(3, sharex=True)
-        points = self.residuals.shape[1]
-        rows, held = np.repeat(self.rows, points), np.repeat(self.validation, points)
-        looks = [
-            (self.residuals_before, np.ones_like(held), "before", "#9AA5B1", "none"),
-            (self.residuals, ~held, "after, fitted to", "#2A6F97", "none"),
-            (self.residuals, held, "after, held out", "#C8553D", "#C8553D"),
-        ]
-        both = np.abs(np.concatenate([self.residuals_before, self.residuals])) * 1e3
-        limit = 2 * float(np.percentile(both, 99)) or 1.0
-        for c, axis in enumerate("xyz"):
-            ax = axes[c]
-            beyond = 0
-            for values, which, label, edge, face in looks:
-                if which.any():
-                    own = values[..., c].ravel()[which] * 1e3
-                    beyond += int((np.abs(own) > limit).sum())
-                    own = np.clip(own, -limit, limit)
-                    ax.scatter(
-                        rows[which],
-                        own,
-                        s=9,
-                        facecolors=face,
-                        edgecolors=edge,
-                        linewidths=0.7,
-                        label=label,
-                    )
-            ax.axhline(0, color="0.3", linewidth=0.8, zorder=0)
-            if beyond:
-                ax.text(0.99, 0.06, f"{beyond} beyond", transform=ax.transAxes, ha="right")
-            ax.set_ylabel(f"{axis} [mm]")
-            ax.grid(True, linewidth=0.4)
-        axes[0].set_title("measured minus predicted", fontsize=10)
-        axes[2].set_xlabel("row of the measurements")
-        ax = axes[0]
-        ax.legend(frameon=False, ncols=3, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1))
-        ax.title.set_horizontalalignment("left")
-        ax.title.set_x(0)
-        return axes
+        return plot_residuals(
+            self.residuals_before, self.residuals, self.rows, self.validation, axes
+        )
 
     def __repr__(self) -> str:
         """Tell what was fitted and how well."""
@@ -256,22 +211,26 @@ def fit(
     TypeError
         A value of another type.
     """
+    # Arguments.
     displacements, measurements = _pair(displacements, measurements)
-    names, measured = checked(robot, displacements, measurements, parameters, model, validation)
+    names, measured = check_problem(
+        robot, displacements, measurements, parameters, model, validation
+    )
     if not isinstance(robust, bool):
         raise TypeError(f"robust: expected a bool, got {type(robust).__name__}")
     max_iterations = whole("max_iterations", max_iterations, 1)
     seed = whole("seed", seed, 0)
+    # Rows that are held out.
     count = len(measured.points)
-    # A share of the rows, drawn by the seed, is held out.
     held = np.zeros(count, dtype=bool)
     order = np.random.default_rng(seed).permutation(count)
     held[order[: round(validation * count)]] = True
+    # Least squares, then the soft-L1 loss, and standard errors.
     points = measured.displacements, measured.points, held.tolist()
     fitted, values, errors, after, before, failed, bound, iterations, done = _core._fit(
         robot, *points, names, model, settings, robust, max_iterations
     )
-    # What speaks against the answer.
+    # What speaks against the fit.
     parts = [] if done else [f"still falling after {iterations} iterations"]
     parts += at_bounds(bound)
     parts += unsolved(failed, count)
