@@ -1,9 +1,11 @@
 //! What must not change the answer, and what must: places, mirrors, starts; saddles, sunk starts, the paper's trunk.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use nalgebra::{Rotation3, Vector3};
 use tdcr::lie::Pose;
 use tdcr::model::Model;
-use tdcr::obstacle::{Cylinder, Obstacle, Sphere};
+use tdcr::obstacle::{Cylinder, FirstFault, Obstacle, SignedDistance, Sphere, by_differences};
 use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
 use tdcr::rod::contact::{LoadedRod, Scratch};
 use tdcr::{Shape, Status};
@@ -22,7 +24,7 @@ fn trunk(rest: Option<Vec<V>>, base: &Pose) -> Robot {
 fn ball(x: f64, y: f64, base: &Pose) -> Case {
     let mut case = Case::new(trunk(None, base));
     let sphere = Obstacle::new(Sphere::new(&V::new(x, y, 0.13), 0.02).unwrap(), false);
-    case.obstacles.push(sphere.transformed(base));
+    case.obstacles.push(sphere.transform(base));
     case
 }
 
@@ -86,6 +88,28 @@ fn a_sunk_start_is_solved_out_and_told() {
 }
 
 /// Its own rest shape is not in the text; here an S of two smooth bends. Zero before touch, one sign after.
+#[test]
+fn the_first_fault_goes_to_its_cell_and_stops_other_solves() {
+    let calls = AtomicUsize::new(0);
+    let broken = by_differences(move |_: &V| {
+        Err(format!("fault {}", calls.fetch_add(1, Ordering::Relaxed)).into())
+    });
+    let mut case = Case::new(trunk(None, &Pose::identity()));
+    case.obstacles.push(Obstacle::new(SignedDistance::new(broken), false));
+    let (plan, first_fault) = (case.plan(), FirstFault::default());
+    let scene = case.scene(&plan);
+    let rod = LoadedRod::new(&case.robot, &plan, &scene).unwrap().reporting_to(&first_fault);
+    for _ in 0..2 {
+        let mut work = Scratch::default();
+        let report = rod.solve(&[-6e-3], &mut work).unwrap();
+        assert_ne!(report.status, Status::Converged);
+        assert!(work.take_fault().is_none());
+    }
+    assert!(first_fault.is_set() && first_fault.stop().load(Ordering::Relaxed));
+    assert_eq!(first_fault.take().unwrap().to_string(), "fault 0");
+    assert!(!first_fault.is_set());
+}
+
 #[test]
 fn the_papers_cylinder() {
     let rest = (0..9).map(|i| V::new(0.0, 0.12 * (0.7 * f64::from(i)).cos(), 0.0)).collect();

@@ -94,7 +94,7 @@ fn obstacle(draw: &mut ChaCha8Rng, l: f64, p: &V) -> (&'static str, Obstacle) {
             let half = r * draw.random_range(0.5..2.0);
             let mesh = prism(sides, 2, r, (-half, half));
             let pose = tdcr::lie::Pose { rotation: turn, translation: center };
-            ("mesh", Obstacle::new(mesh, false).transformed(&pose))
+            ("mesh", Obstacle::new(mesh, false).transform(&pose))
         }
     }
 }

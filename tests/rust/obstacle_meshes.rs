@@ -59,7 +59,7 @@ fn cubes(pose: &Pose, inside: bool) -> (Obstacle, Obstacle) {
     let (vertices, faces) = cube_parts();
     let mesh = Mesh::new(&vertices, &faces).unwrap();
     let cuboid = Cuboid::new(&V::zeros(), &V::from(HALF), &Matrix3::identity()).unwrap();
-    let place = |obstacle: Obstacle| obstacle.transformed(pose);
+    let place = |obstacle: Obstacle| obstacle.transform(pose);
     (place(Obstacle::new(mesh, inside)), place(Obstacle::new(cuboid, inside)))
 }
 

@@ -102,7 +102,7 @@ proptest! {
     #[test]
     fn moving_obstacle_and_point_together_changes_nothing(x in point(), pose in pose()) {
         for obstacle in closed_forms() {
-            let (here, there) = (nearest(&obstacle, &x), nearest(&obstacle.transformed(&pose), &pose.transform(&x)));
+            let (here, there) = (nearest(&obstacle, &x), nearest(&obstacle.transform(&pose), &pose.transform(&x)));
             prop_assert!((here.distance - there.distance).abs() < 2e-15);
             prop_assume!(here.hessian.amax() < 1e3);
             prop_assert!((pose.rotation * here.gradient - there.gradient).amax() < 1e-11);
@@ -233,7 +233,7 @@ fn a_sphere_by_its_function_is_the_sphere() {
     for (f, by_gradient, by_curve) in [(exact, 1e-15, 1e-6), (by_function(false), 1e-9, 1e-3)] {
         for motion in [Pose::identity(), pose] {
             let (f, sphere, x) =
-                (f.transformed(&motion), sphere().transformed(&motion), motion.transform(&x));
+                (f.transform(&motion), sphere().transform(&motion), motion.transform(&x));
             let mut got = Vec::new();
             f.constraints(&x, 0.1, &mut got).unwrap();
             let want = nearest(&sphere, &x);

@@ -203,6 +203,7 @@ fn displacements_are_checked() {
 }
 
 #[test]
+#[allow(clippy::mutable_key_type)] // The plans kept with a robot are no part of its value.
 fn equality_and_hash_are_by_value() {
     let build = |azimuth: f64, name: Option<&str>| {
         let tendons = vec![Tendon::straight(azimuth, 0.01).unwrap()];

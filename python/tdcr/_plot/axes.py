@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdcr._base.arguments import numbers
-from tdcr._core import Cylinder, HalfSpace
-from tdcr._plot.obstacles import section, surface
+from tdcr._plot.obstacles import is_endless, section, surface
 from tdcr._plot.projection import Plane, smooth
 from tdcr.errors import InvalidInput
 
@@ -191,7 +190,7 @@ class Solid:
             Poly3DCollection,
         )
 
-        endless = isinstance(obstacle, (Cylinder, HalfSpace))
+        endless = is_endless(obstacle)
         polygons = surface(obstacle, *self.scene.box(0.2 if endless else 1.0))
         if polygons is None or not len(polygons):
             return

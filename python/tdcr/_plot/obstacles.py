@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tdcr import _core
 
-__all__ = ["section", "surface"]
+__all__ = ["is_endless", "section", "surface"]
 
 Points = NDArray[np.float64]
 
@@ -63,6 +63,11 @@ def surface(obstacle: Any, low: Points, high: Points) -> Points | None:
     places = polygons.mean(axis=1)
     kept: Points = polygons[((places >= low) & (places <= high)).all(axis=1)]
     return kept
+
+
+def is_endless(obstacle: Any) -> bool:
+    """Presence of a surface without an end, of which a picture shows a part."""
+    return isinstance(obstacle, (_core.Cylinder, _core.HalfSpace))
 
 
 def section(

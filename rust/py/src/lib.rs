@@ -75,11 +75,7 @@ mod _core {
     #[pymodule_export]
     use crate::scene::loads::Loads;
     #[pymodule_export]
-    use crate::scene::mesh::Mesh;
-    #[pymodule_export]
     use crate::scene::obstacle::{Obstacle, clearance};
-    #[pymodule_export]
-    use crate::scene::shapes::{Capsule, Cuboid, Cylinder, HalfSpace, Sphere};
     #[pymodule_export]
     use crate::scene::signed_distance::SignedDistance;
     #[pymodule_export]
@@ -103,6 +99,7 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::scene::shapes::add_shapes(module)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

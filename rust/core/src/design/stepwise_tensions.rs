@@ -18,7 +18,7 @@ pub(super) struct Answer {
     pub(super) iterations: usize,
 }
 
-/// StepwiseInversees with the tensions that the displacements ask for; none when it finds none. Tendons that would
+/// Inverts step by step with the tensions that the displacements ask for; none when it finds none. Tendons that would
 /// have to push are slack.
 pub(super) fn solve_tensions(
     plan: &Plan,

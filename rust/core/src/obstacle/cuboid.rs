@@ -1,9 +1,12 @@
 //! A box with any axes: six faces, twelve edges, eight vertices, in closed form.
 
+use std::hash::Hasher;
+
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Near, moved, tightest_first, within};
+use super::{Fault, Near, Solid, move_pose, tightest_first, within};
 use crate::error::{self, InvalidInput, finite_vector, length};
+use crate::hashing::Bits;
 use crate::lie::Pose;
 
 /// A box with any axes.
@@ -66,10 +69,6 @@ impl Cuboid {
         self.pose.rotation
     }
 
-    pub(super) fn transformed(&self, pose: &Pose) -> Self {
-        Self { pose: moved(pose, &self.pose), ..*self }
-    }
-
     fn local(&self, x: &Vector3<f64>) -> Vector3<f64> {
         self.pose.rotation.tr_mul(&(x - self.pose.translation))
     }
@@ -84,7 +83,7 @@ impl Cuboid {
     }
 
     /// Inside, the nearest face; of equally near ones the first axis, and its positive side.
-    pub(super) fn near(&self, x: &Vector3<f64>) -> Near {
+    fn nearest(&self, x: &Vector3<f64>) -> Near {
         let x = self.local(x);
         let mut side = [0; 3];
         let mut from = Vector3::zeros();
@@ -106,18 +105,18 @@ impl Cuboid {
         if clear < 2 || from.norm() < super::KINK {
             return self.face(&x, nearest, sign);
         }
-        Near::round(&from, &across, 0.0, from).rotated(&self.pose.rotation).of(code(side))
+        Near::round(&from, &across, 0.0, from).rotate(&self.pose.rotation).of(code(side))
     }
 
     /// Every face of the lumen within reach, or the nearest: the inside is their intersection.
-    pub(super) fn lumen(&self, x: &Vector3<f64>, reach: f64, out: &mut Vec<Near>) {
-        let nearest = self.near(x).flipped(true);
+    fn lumen(&self, x: &Vector3<f64>, reach: f64, out: &mut Vec<Near>) {
+        let nearest = self.nearest(x).flip_if(true);
         let within = within(nearest.distance, reach);
         let x = self.local(x);
         let start = out.len();
         for axis in 0..3 {
             for sign in [1.0, -1.0] {
-                let face = self.face(&x, axis, sign).flipped(true);
+                let face = self.face(&x, axis, sign).flip_if(true);
                 if face.distance <= within {
                     out.push(face);
                 }
@@ -127,6 +126,36 @@ impl Cuboid {
             out.push(nearest);
         }
         tightest_first(&mut out[start..]);
+    }
+}
+
+impl Solid for Cuboid {
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { pose: move_pose(pose, &self.pose), ..*self }
+    }
+
+    fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+        Ok(self.nearest(x))
+    }
+
+    fn constraints(
+        &self,
+        x: &Vector3<f64>,
+        reach: f64,
+        inside: bool,
+        out: &mut Vec<Near>,
+    ) -> Result<(), Fault> {
+        if inside {
+            self.lumen(x, reach, out);
+        } else {
+            out.push(self.nearest(x));
+        }
+        Ok(())
+    }
+
+    fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
+        bits.vectors(&[self.center(), self.half_extents]);
+        bits.floats(self.pose.rotation.as_slice());
     }
 }
 

@@ -11,6 +11,8 @@ mod mesh;
 mod signed_distance;
 mod smooth;
 
+use std::hash::Hasher;
+
 use nalgebra::{Matrix3, Vector3};
 
 pub use cuboid::Cuboid;
@@ -70,7 +72,7 @@ impl Near {
     }
 
     /// Condition seen from the other side.
-    fn flipped(self, flip: bool) -> Self {
+    fn flip_if(self, flip: bool) -> Self {
         if !flip {
             return self;
         }
@@ -78,7 +80,7 @@ impl Near {
         Self { distance: -self.distance, gradient, hessian, feature: self.feature }
     }
 
-    fn rotated(self, rotation: &Matrix3<f64>) -> Self {
+    fn rotate(self, rotation: &Matrix3<f64>) -> Self {
         let gradient = rotation * self.gradient;
         Self { gradient, hessian: rotation * self.hessian * rotation.transpose(), ..self }
     }
@@ -89,47 +91,106 @@ impl Near {
     }
 }
 
-/// The shapes an obstacle can have.
-///
-/// ```
-/// use nalgebra::Vector3;
-/// use tdcr::obstacle::{HalfSpace, Volume};
-///
-/// # fn main() -> Result<(), tdcr::InvalidInput> {
-/// let floor = Volume::from(HalfSpace::new(&Vector3::zeros(), &Vector3::z())?);
-/// assert!(matches!(floor, Volume::HalfSpace(_)));
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-pub enum Volume {
-    /// A ball.
-    Sphere(Sphere),
-    /// An infinite round bar.
-    Cylinder(Cylinder),
-    /// All that lies behind a plane.
-    HalfSpace(HalfSpace),
-    /// A bar with round ends.
-    Capsule(Capsule),
-    /// A box with any axes.
-    Cuboid(Cuboid),
-    /// The inside of a closed surface of triangles.
-    Mesh(Mesh),
-    /// Whatever a function calls the inside.
-    SignedDistance(SignedDistance),
+/// Solid of an obstacle. A new one is a file that implements this, and a line in the list of [`Volume`].
+trait Solid: Sized {
+    /// Solid moved with its frame.
+    fn transform(&self, pose: &Pose) -> Self;
+
+    /// Signed distance of a point, positive outside, with its derivatives.
+    fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault>;
+
+    /// Conditions for [`Obstacle::constraints`]: the nearest place, unless the solid has several parts.
+    fn constraints(
+        &self,
+        x: &Vector3<f64>,
+        _reach: f64,
+        inside: bool,
+        out: &mut Vec<Near>,
+    ) -> Result<(), Fault> {
+        out.push(self.near(x)?.flip_if(inside));
+        Ok(())
+    }
+
+    /// Feeds all that tells it from others to a hasher.
+    fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>);
 }
 
-macro_rules! volume_from {
-    ($($name:ident),*) => {$(
-        impl From<$name> for Volume {
+/// Writes [`Volume`], a solid of any kind, from a list of solids.
+macro_rules! volume {
+    ($($(#[$doc:meta])* $name:ident,)*) => {
+        /// The shapes an obstacle can have.
+        ///
+        /// ```
+        /// use nalgebra::Vector3;
+        /// use tdcr::obstacle::{HalfSpace, Volume};
+        ///
+        /// # fn main() -> Result<(), tdcr::InvalidInput> {
+        /// let floor = Volume::from(HalfSpace::new(&Vector3::zeros(), &Vector3::z())?);
+        /// assert!(matches!(floor, Volume::HalfSpace(_)));
+        /// # Ok(())
+        /// # }
+        /// ```
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Volume {
+            $($(#[$doc])* $name($name),)*
+        }
+
+        $(impl From<$name> for Volume {
             fn from(volume: $name) -> Self {
                 Self::$name(volume)
             }
+        })*
+
+        impl Solid for Volume {
+            fn transform(&self, pose: &Pose) -> Self {
+                match self {
+                    $(Self::$name(v) => v.transform(pose).into(),)*
+                }
+            }
+
+            fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+                match self {
+                    $(Self::$name(v) => v.near(x),)*
+                }
+            }
+
+            fn constraints(
+                &self,
+                x: &Vector3<f64>,
+                reach: f64,
+                inside: bool,
+                out: &mut Vec<Near>,
+            ) -> Result<(), Fault> {
+                match self {
+                    $(Self::$name(v) => v.constraints(x, reach, inside, out),)*
+                }
+            }
+
+            fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
+                match self {
+                    $(Self::$name(v) => v.hash_bits(bits),)*
+                }
+            }
         }
-    )*};
+    };
 }
 
-volume_from!(Sphere, Cylinder, HalfSpace, Capsule, Cuboid, Mesh, SignedDistance);
+volume! {
+    /// A ball.
+    Sphere,
+    /// An infinite round bar.
+    Cylinder,
+    /// All that lies behind a plane.
+    HalfSpace,
+    /// A bar with round ends.
+    Capsule,
+    /// A box with any axes.
+    Cuboid,
+    /// The inside of a closed surface of triangles.
+    Mesh,
+    /// Whatever a function calls the inside.
+    SignedDistance,
+}
 
 /// A volume that the robot stays out of, or inside of. Cheap to clone.
 ///
@@ -170,17 +231,8 @@ impl Obstacle {
 
     /// Obstacle moved with its frame: given in the frame `pose`, seen from outside that frame.
     #[must_use]
-    pub fn transformed(&self, pose: &Pose) -> Self {
-        let volume = match &self.volume {
-            Volume::Sphere(v) => v.transformed(pose).into(),
-            Volume::Cylinder(v) => v.transformed(pose).into(),
-            Volume::HalfSpace(v) => v.transformed(pose).into(),
-            Volume::Capsule(v) => v.transformed(pose).into(),
-            Volume::Cuboid(v) => v.transformed(pose).into(),
-            Volume::Mesh(v) => v.transformed(pose).into(),
-            Volume::SignedDistance(v) => v.transformed(pose).into(),
-        };
-        Self { volume, inside: self.inside }
+    pub fn transform(&self, pose: &Pose) -> Self {
+        Self { volume: self.volume.transform(pose), inside: self.inside }
     }
 
     /// The signed distance of a point \[m\] with its derivatives.
@@ -191,16 +243,7 @@ impl Obstacle {
     /// # Errors
     /// A [`SignedDistance`] that failed; no other volume can.
     pub fn nearest(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
-        let near = match &self.volume {
-            Volume::Sphere(v) => v.near(x),
-            Volume::Cylinder(v) => v.near(x),
-            Volume::HalfSpace(v) => v.near(x),
-            Volume::Capsule(v) => v.near(x),
-            Volume::Cuboid(v) => v.near(x),
-            Volume::Mesh(v) => v.near(x),
-            Volume::SignedDistance(v) => v.near(x)?,
-        };
-        Ok(near.flipped(self.inside))
+        Ok(self.volume.near(x)?.flip_if(self.inside))
     }
 
     /// Appends the conditions that together say, near `x`, that a point is where it may be: all that a
@@ -220,41 +263,13 @@ impl Obstacle {
         reach: f64,
         out: &mut Vec<Near>,
     ) -> Result<(), Fault> {
-        match &self.volume {
-            Volume::Cuboid(cuboid) if self.inside => cuboid.lumen(x, reach, out),
-            Volume::Mesh(mesh) => mesh.constraints(x, reach, self.inside, out),
-            Volume::SignedDistance(function) => {
-                out.push(function.curved(x, reach)?.flipped(self.inside));
-            }
-            _ => out.push(self.nearest(x)?),
-        }
-        Ok(())
+        self.volume.constraints(x, reach, self.inside, out)
     }
 }
 
 hash_by_bits!(Obstacle, |obstacle, bits| {
     bits.counts(&[usize::from(obstacle.inside)]);
-    match &obstacle.volume {
-        Volume::Sphere(v) => {
-            bits.vectors(&[v.center()]);
-            bits.float(v.radius());
-        }
-        Volume::Cylinder(v) => {
-            bits.vectors(&[v.point(), v.axis()]);
-            bits.float(v.radius());
-        }
-        Volume::HalfSpace(v) => bits.vectors(&[v.point(), v.normal()]),
-        Volume::Capsule(v) => {
-            bits.vectors(&[v.a(), v.b()]);
-            bits.float(v.radius());
-        }
-        Volume::Cuboid(v) => {
-            bits.vectors(&[v.center(), v.half_extents()]);
-            bits.floats(v.rotation().as_slice());
-        }
-        Volume::Mesh(v) => v.hash_bits(&mut bits),
-        Volume::SignedDistance(v) => bits.counts(&[v.address()]),
-    }
+    obstacle.volume.hash_bits(&mut bits);
 });
 
 /// Distance from a point within which others count.
@@ -269,19 +284,19 @@ fn tightest_first(entries: &mut [Near]) {
 }
 
 /// A rigid motion without negative zeros, so that equal obstacles have equal bits.
-fn moved(pose: &Pose, inner: &Pose) -> Pose {
+fn move_pose(pose: &Pose, inner: &Pose) -> Pose {
     let pose = pose.compose(inner);
     let (rotation, translation) =
         (pose.rotation.map(|e| e + 0.0), pose.translation.map(|e| e + 0.0));
     Pose { rotation, translation }
 }
 
-/// A place moved, without negative zeros.
-fn moved_point(pose: &Pose, point: &Vector3<f64>) -> Vector3<f64> {
+/// A place moved by a pose, without negative zeros.
+fn move_point(pose: &Pose, point: &Vector3<f64>) -> Vector3<f64> {
     pose.transform(point).map(|e| e + 0.0)
 }
 
-/// A direction turned, without negative zeros.
-fn turned(pose: &Pose, direction: &Vector3<f64>) -> Vector3<f64> {
+/// A direction turned by a pose, without negative zeros.
+fn turn_direction(pose: &Pose, direction: &Vector3<f64>) -> Vector3<f64> {
     (pose.rotation * direction).map(|e| e + 0.0)
 }

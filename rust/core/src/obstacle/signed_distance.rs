@@ -1,12 +1,14 @@
 //! Volumes that a function describes.
 
 use std::fmt;
+use std::hash::Hasher;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Near, moved};
+use super::{Near, Solid, move_pose};
 use crate::error::InvalidInput;
+use crate::hashing::Bits;
 use crate::lie::Pose;
 
 /// Error of a distance function.
@@ -95,12 +97,8 @@ impl SignedDistance {
         Self { function, pose: Pose::identity() }
     }
 
-    pub(super) fn transformed(&self, pose: &Pose) -> Self {
-        Self { function: self.function.clone(), pose: moved(pose, &self.pose) }
-    }
-
     /// A number that clones share and no other function has.
-    pub(super) fn address(&self) -> usize {
+    fn address(&self) -> usize {
         Arc::as_ptr(&self.function).cast::<()>().addr()
     }
 
@@ -123,13 +121,9 @@ impl SignedDistance {
         self.pose.rotation.tr_mul(&(x - self.pose.translation))
     }
 
-    pub(super) fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
-        Ok(self.evaluate(&self.local(x))?.rotated(&self.pose.rotation))
-    }
-
-    /// With the Hessian within reach of the surface: central differences of the gradient, whose step of
+    /// Signed distance with its Hessian within reach of the surface: central differences of the gradient, whose step of
     /// ε^(1/4) suits gradients that are differences themselves.
-    pub(super) fn curved(&self, x: &Vector3<f64>, reach: f64) -> Result<Near, Fault> {
+    fn near_with_hessian(&self, x: &Vector3<f64>, reach: f64) -> Result<Near, Fault> {
         let x = self.local(x);
         let mut near = self.evaluate(&x)?;
         if near.distance.abs() <= reach {
@@ -142,7 +136,32 @@ impl SignedDistance {
             }
             near.hessian = (columns + columns.transpose()) / 2.0;
         }
-        Ok(near.rotated(&self.pose.rotation))
+        Ok(near.rotate(&self.pose.rotation))
+    }
+}
+
+impl Solid for SignedDistance {
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { function: self.function.clone(), pose: move_pose(pose, &self.pose) }
+    }
+
+    fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+        Ok(self.evaluate(&self.local(x))?.rotate(&self.pose.rotation))
+    }
+
+    fn constraints(
+        &self,
+        x: &Vector3<f64>,
+        reach: f64,
+        inside: bool,
+        out: &mut Vec<Near>,
+    ) -> Result<(), Fault> {
+        out.push(self.near_with_hessian(x, reach)?.flip_if(inside));
+        Ok(())
+    }
+
+    fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
+        bits.counts(&[self.address()]);
     }
 }
 

@@ -1,9 +1,12 @@
 //! Volumes of one smooth surface: sphere, cylinder, half-space, capsule.
 
+use std::hash::Hasher;
+
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Near, moved_point, turned};
+use super::{Fault, Near, Solid, move_point, turn_direction};
 use crate::error::{InvalidInput, direction, finite_vector, length};
+use crate::hashing::Bits;
 use crate::lie::Pose;
 
 /// A ball.
@@ -45,14 +48,21 @@ impl Sphere {
     pub fn radius(&self) -> f64 {
         self.radius
     }
+}
 
-    pub(super) fn transformed(&self, pose: &Pose) -> Self {
-        Self { center: moved_point(pose, &self.center), ..*self }
+impl Solid for Sphere {
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { center: move_point(pose, &self.center), ..*self }
     }
 
     /// At the centre the gradient is the world's x axis.
-    pub(super) fn near(&self, x: &Vector3<f64>) -> Near {
-        Near::round(&(x - self.center), &Matrix3::identity(), self.radius, Vector3::x())
+    fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+        Ok(Near::round(&(x - self.center), &Matrix3::identity(), self.radius, Vector3::x()))
+    }
+
+    fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
+        bits.vectors(&[self.center]);
+        bits.float(self.radius);
     }
 }
 
@@ -107,15 +117,22 @@ impl Cylinder {
     pub fn radius(&self) -> f64 {
         self.radius
     }
+}
 
-    pub(super) fn transformed(&self, pose: &Pose) -> Self {
-        let (point, axis) = (moved_point(pose, &self.point), turned(pose, &self.axis));
+impl Solid for Cylinder {
+    fn transform(&self, pose: &Pose) -> Self {
+        let (point, axis) = (move_point(pose, &self.point), turn_direction(pose, &self.axis));
         Self { point, axis, ..*self }
     }
 
     /// On the axis the gradient is the part across the axis of the world axis most across it.
-    pub(super) fn near(&self, x: &Vector3<f64>) -> Near {
-        around_axis(&(x - self.point), &self.axis, self.radius)
+    fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+        Ok(around_axis(&(x - self.point), &self.axis, self.radius))
+    }
+
+    fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
+        bits.vectors(&[self.point, self.axis]);
+        bits.float(self.radius);
     }
 }
 
@@ -158,13 +175,19 @@ impl HalfSpace {
     pub fn normal(&self) -> Vector3<f64> {
         self.normal
     }
+}
 
-    pub(super) fn transformed(&self, pose: &Pose) -> Self {
-        Self { point: moved_point(pose, &self.point), normal: turned(pose, &self.normal) }
+impl Solid for HalfSpace {
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { point: move_point(pose, &self.point), normal: turn_direction(pose, &self.normal) }
     }
 
-    pub(super) fn near(&self, x: &Vector3<f64>) -> Near {
-        Near::flat(self.normal.dot(&(x - self.point)), self.normal)
+    fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+        Ok(Near::flat(self.normal.dot(&(x - self.point)), self.normal))
+    }
+
+    fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
+        bits.vectors(&[self.point, self.normal]);
     }
 }
 
@@ -218,26 +241,33 @@ impl Capsule {
     pub fn radius(&self) -> f64 {
         self.radius
     }
+}
 
-    pub(super) fn transformed(&self, pose: &Pose) -> Self {
-        Self { a: moved_point(pose, &self.a), b: moved_point(pose, &self.b), ..*self }
+impl Solid for Capsule {
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { a: move_point(pose, &self.a), b: move_point(pose, &self.b), ..*self }
     }
 
     /// On the segment the gradient is as on a cylinder's axis; of a single point, as in a sphere's centre.
-    pub(super) fn near(&self, x: &Vector3<f64>) -> Near {
+    fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
         let along = self.b - self.a;
         let span = along.norm();
+        let from = x - self.a;
         if span < super::KINK {
-            return Near::round(&(x - self.a), &Matrix3::identity(), self.radius, Vector3::x());
+            return Ok(Near::round(&from, &Matrix3::identity(), self.radius, Vector3::x()));
         }
         let axis = along / span;
-        let from = x - self.a;
         let t = axis.dot(&from);
         if t > 0.0 && t < span {
-            return around_axis(&from, &axis, self.radius);
+            return Ok(around_axis(&from, &axis, self.radius));
         }
         let end = if t <= 0.0 { self.a } else { self.b };
-        Near::round(&(x - end), &Matrix3::identity(), self.radius, across(&axis))
+        Ok(Near::round(&(x - end), &Matrix3::identity(), self.radius, across(&axis)))
+    }
+
+    fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
+        bits.vectors(&[self.a, self.b]);
+        bits.float(self.radius);
     }
 }
 

@@ -51,24 +51,28 @@ pub(super) fn solve_near(
 /// Buffers of load stepping.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LoadStepping {
+    /// Target tensions, and the plan's unit of tension in the unit that these are in.
     target: Vec<f64>,
+    unit: f64,
     /// Strains at the last load that was reached.
     reached: Vec<f64>,
 }
 
 impl LoadStepping {
-    /// Solves from the strains of a system without tensions to the target tensions. Where no shorter load step helps,
+    /// Solves from the strains of a system without tensions to target tensions of a unit. Where no shorter load step helps,
     /// the system is left at the last load that was reached.
     pub(super) fn solve(
         &mut self,
         plan: &Plan,
         system: &mut NewtonSystem,
         target: impl Iterator<Item = f64>,
+        unit: f64,
         limits: &Limits,
         budget: &mut usize,
     ) -> (Ending, Residual) {
         self.target.clear();
         self.target.extend(target);
+        self.unit = unit;
         self.reached.clone_from(&system.strains);
         let (mut load, mut step) = (0.0, 1.0_f64);
         loop {
@@ -95,7 +99,7 @@ impl LoadStepping {
 
     fn set_load(&self, system: &mut NewtonSystem, load: f64) {
         for (tension, target) in system.tensions.iter_mut().zip(&self.target) {
-            *tension = load * target;
+            *tension = load * target / self.unit;
         }
     }
 }

@@ -276,14 +276,14 @@ impl Model for Rod<'_> {
         system.clear_bounds(self.plan);
         system.active.clear();
         system.active.extend(tensions.iter().map(|tension| *tension > 0.0));
-        let target = tensions.iter().map(|tension| tension / self.plan.unit);
+        let (target, unit) = (tensions.iter().copied(), self.plan.unit);
         let limits = Limits {
             newton_steps: NEWTON_STEPS,
             tolerance: self.plan.settings.tolerance,
             shortest_load_step: SHORTEST,
         };
         (work.ending, work.residual) =
-            load_stepping.solve(self.plan, system, target, &limits, &mut budget);
+            load_stepping.solve(self.plan, system, target, unit, &limits, &mut budget);
         Ok(self.report(work, self.plan.settings.max_iterations - budget))
     }
 

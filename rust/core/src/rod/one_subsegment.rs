@@ -87,7 +87,7 @@ impl OneSubsegment {
         let (limits, mut budget) = (self.limits(), usize::MAX);
         let Self { part, tendons, system, load_stepping, .. } = self;
         let target = tendons.iter().map(|tendon| tensions[*tendon]);
-        let (ending, _) = load_stepping.solve(part, system, target, &limits, &mut budget);
+        let (ending, _) = load_stepping.solve(part, system, target, 1.0, &limits, &mut budget);
         ending == Ending::Converged || {
             // A tendon that crosses sides may go either way.
             self.system.reset(&self.part);

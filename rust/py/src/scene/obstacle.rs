@@ -15,7 +15,7 @@ const CHUNK: usize = 4096;
 
 /// Base of all obstacles: volumes that a robot stays out of, or inside of.
 ///
-/// Made as one of `Sphere`, `Cylinder`, `HalfSpace`, `Capsule`, `Box`, `Mesh`, `SignedDistance`.
+/// Made as one of its kinds: `Sphere`, `Mesh`, `SignedDistance` and the others that extend it.
 /// Frozen; equal and hashed by value.
 #[pyclass(frozen, eq, hash, subclass, module = "tdcr")]
 #[derive(PartialEq, Eq, Hash)]

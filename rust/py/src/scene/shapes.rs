@@ -10,7 +10,18 @@ use tdcr::obstacle as core;
 
 use crate::convert::arguments::number;
 use crate::convert::arrays::{frozen, frozen_vector, invalid, matrix3, vector};
+use crate::scene::mesh::Mesh;
 use crate::scene::obstacle::Obstacle;
+
+/// Adds the classes of obstacles that are data: a new one is a class and a line here.
+pub(crate) fn add_shapes(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Sphere>()?;
+    module.add_class::<Cylinder>()?;
+    module.add_class::<HalfSpace>()?;
+    module.add_class::<Capsule>()?;
+    module.add_class::<Cuboid>()?;
+    module.add_class::<Mesh>()
+}
 
 type NewArgs<'py> = (Bound<'py, PyTuple>, Bound<'py, PyDict>);
 

@@ -133,7 +133,7 @@ impl<'a> FromRest<'a> {
     ) -> bool {
         let mut displacements = vec![0.0; self.robot.tendons().len()];
         problem.write_displacements(&mut displacements);
-        let report = self.rod.lead(&displacements, &mut self.work, self.stop);
+        let report = self.rod.solve_until(&displacements, &mut self.work, self.stop);
         let base = self.robot.base();
         let tip = self.rod.state(&self.work).frames.last().copied();
         let tool = tip.unwrap_or_else(Pose::identity).compose(self.robot.tool());

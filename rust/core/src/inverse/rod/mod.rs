@@ -296,7 +296,7 @@ impl Inverter for RodInverse<'_> {
         self.robot.check_displacements(displacements)?;
         if let Some(rod) = &self.loaded {
             let mut work = contact::Scratch::default();
-            rod.lead(displacements, &mut work, stop.map(AsRef::as_ref));
+            rod.solve_until(displacements, &mut work, stop.map(AsRef::as_ref));
             return Ok(rod.take_state(work));
         }
         let (mut rod, mut work) = (self.rest.rod().clone(), rod::Scratch::default());

@@ -14,7 +14,7 @@ impl RodInverse<'_> {
         if !answer.distance.is_nan() {
             return "the bounds leave the robot no shape".to_owned();
         }
-        let own = self.loaded.as_ref().map_or_else(String::new, LoadedRod::hindrance);
+        let own = self.loaded.as_ref().map_or_else(String::new, LoadedRod::slack_message);
         let own = if own.is_empty() { own } else { format!("; without tensions: {own}") };
         format!("none of {} starts leads to a shape of the robot{own}", answer.starts)
     }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::{Near, moved, tightest_first};
+use super::{Fault, Near, Solid, move_pose, tightest_first};
 use crate::error::InvalidInput;
 use crate::hashing::Bits;
 use crate::lie::Pose;
@@ -63,11 +63,17 @@ impl Mesh {
         &self.surface.faces
     }
 
-    pub(super) fn transformed(&self, pose: &Pose) -> Self {
-        Self { surface: self.surface.clone(), pose: moved(pose, &self.pose) }
+    fn local(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        self.pose.rotation.tr_mul(&(x - self.pose.translation))
+    }
+}
+
+impl Solid for Mesh {
+    fn transform(&self, pose: &Pose) -> Self {
+        Self { surface: self.surface.clone(), pose: move_pose(pose, &self.pose) }
     }
 
-    pub(super) fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
+    fn hash_bits<H: Hasher>(&self, bits: &mut Bits<'_, H>) {
         bits.vectors(&self.surface.vertices);
         for face in &self.surface.faces {
             bits.counts(face);
@@ -76,28 +82,24 @@ impl Mesh {
         bits.floats(self.pose.translation.as_slice());
     }
 
-    fn local(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        self.pose.rotation.tr_mul(&(x - self.pose.translation))
+    fn near(&self, x: &Vector3<f64>) -> Result<Near, Fault> {
+        Ok(self.surface.near(&self.local(x)).rotate(&self.pose.rotation))
     }
 
-    pub(super) fn near(&self, x: &Vector3<f64>) -> Near {
-        self.surface.near(&self.local(x)).rotated(&self.pose.rotation)
-    }
-
-    /// See [`super::Obstacle::constraints`].
-    pub(super) fn constraints(
+    fn constraints(
         &self,
         x: &Vector3<f64>,
         reach: f64,
         inside: bool,
         out: &mut Vec<Near>,
-    ) {
+    ) -> Result<(), Fault> {
         let start = out.len();
         self.surface.constraints(&self.local(x), reach, inside, out);
         for entry in &mut out[start..] {
-            *entry = entry.rotated(&self.pose.rotation);
+            *entry = entry.rotate(&self.pose.rotation);
         }
         tightest_first(&mut out[start..]);
+        Ok(())
     }
 }
 

@@ -57,10 +57,10 @@ impl Surface {
     ) {
         let start = out.len();
         let nearest = self.nearest(x);
-        let first = self.entry(&nearest, x).flipped(inside);
+        let first = self.entry(&nearest, x).flip_if(inside);
         if self.is_hollow(nearest.place, inside) {
             for face in self.faces_at(&nearest) {
-                push(out, start, self.plane(*face, x).flipped(inside));
+                push(out, start, self.plane(*face, x).flip_if(inside));
             }
         } else {
             out.push(first);
@@ -74,7 +74,7 @@ impl Surface {
             if self.is_hollow(hit.place, inside) {
                 hollows = true;
             } else if self.is_nearest_around(&hit, x) {
-                let entry = self.entry(&hit, x).flipped(inside);
+                let entry = self.entry(&hit, x).flip_if(inside);
                 // What is looked at from within the solid is no wall, but the back of one.
                 if entry.distance >= 0.0 {
                     push(out, start, entry);
@@ -110,7 +110,7 @@ impl Surface {
                 };
                 self.faces_at(&hit).iter().any(there)
             };
-            let entry = self.plane(hit.face, x).flipped(inside);
+            let entry = self.plane(hit.face, x).flip_if(inside);
             // A plane nearer than the surface cuts through free space, and one that x is behind may be
             // the alternative to another, on the far side of a ridge. But one that the way out leads out of,
             // too, would be met all of a sudden where x comes to their common edge.
@@ -249,22 +249,27 @@ impl Surface {
         }
         let from = x - self.vertices[vertices[0]];
         let across = Matrix3::identity() - along * along.transpose();
-        self.rounded(&(across * from), &across, normal).of(self.faces.len() + edge)
+        self.corner_entry(&(across * from), &across, normal).of(self.faces.len() + edge)
     }
 
     fn vertex_entry(&self, vertex: usize, x: &Vector3<f64>) -> Near {
         let from = x - self.vertices[vertex];
         let before = self.faces.len() + self.edges.len();
         let normal = &self.vertex_normals[vertex];
-        self.rounded(&from, &Matrix3::identity(), normal).of(before + vertex)
+        self.corner_entry(&from, &Matrix3::identity(), normal).of(before + vertex)
     }
 
     /// Around an edge or a vertex, on the side that its mean normal says.
-    fn rounded(&self, from: &Vector3<f64>, across: &Matrix3<f64>, normal: &Vector3<f64>) -> Near {
+    fn corner_entry(
+        &self,
+        from: &Vector3<f64>,
+        across: &Matrix3<f64>,
+        normal: &Vector3<f64>,
+    ) -> Near {
         if from.norm() <= TOUCH * self.scale {
             return Near::flat(normal.dot(from), *normal);
         }
-        Near::round(from, across, 0.0, *normal).flipped(normal.dot(from) < 0.0)
+        Near::round(from, across, 0.0, *normal).flip_if(normal.dot(from) < 0.0)
     }
 }
 

@@ -75,11 +75,13 @@ pub(super) fn from_parry(v: Vector) -> Vector3<f64> {
 }
 
 impl Surface {
+    /// Surface of checked vertices and faces, with all that queries need.
     pub(super) fn new(
         vertices: &[Vector3<f64>],
         faces: &[[usize; 3]],
     ) -> Result<Self, InvalidInput> {
         let Checked { vertices, faces, edges } = check(vertices, faces)?;
+        // Triangles and their normals.
         let corner = |face: &[usize; 3], k: usize| vertices[face[k % 3]];
         let triangles: Vec<Triangle> = (faces.iter())
             .map(|face| {
@@ -93,11 +95,13 @@ impl Surface {
                 (corner(face, 1) - a).cross(&(corner(face, 2) - a)).normalize()
             })
             .collect();
+        // Pseudonormals of vertices and edges, which tell inside from outside.
         let vertex_normals = vertex_normals(&vertices, &faces, &normals);
         let edges: Vec<Edge> = edges
             .iter()
             .map(|(ends, sides)| edge(&vertices, &faces, &normals, *ends, *sides))
             .collect();
+        // The tree of boxes, and the faces around every vertex.
         let boxes: Vec<Aabb> = triangles.iter().map(Triangle::local_aabb).collect();
         let scale = vertices.iter().map(Vector3::amax).fold(0.0, f64::max);
         let (fan_starts, fans) = fans(vertices.len(), &faces);
@@ -116,6 +120,7 @@ impl Surface {
             fans,
             scale,
         };
+        // Kinds of corners: they need all of the above.
         surface.corners = (0..surface.vertices.len()).map(|v| surface.corner(v)).collect();
         Ok(surface)
     }

@@ -207,7 +207,7 @@ impl<'s, 'a> SwarmObjective<'s, 'a> {
         match self.handover {
             Handover::None => self.done = report.status == Status::Converged,
             Handover::Polish if !self.done && self.lowest.0 < self.polished_at => {
-                self.polish_best()
+                self.polish_best();
             }
             Handover::Polish => {}
             Handover::Constrain => self.select_clear(),

@@ -1,16 +1,22 @@
-//! The rod among obstacles and under loads: what it meets, and how that is solved.
+//! The rod among obstacles and under loads: minimum of its energy under inequalities, by an augmented Lagrangian.
 //!
-//! The mathematics is in `docs/contact.md`.
+//! The mathematics is in `docs/contact.md`, whose letters the code uses. From the bottom up: `scene` and `loads`
+//! are what surrounds a robot, `potential` and `lagrangian` the function that is minimised, `riccati` its Newton
+//! step, `augmented_lagrangian` the minimisation at given multipliers and their updates, `continuation` the way
+//! from rest in load steps, whose places `load_state` keeps, and `model` the forward model.
 
 mod augmented_lagrangian;
-pub(in crate::rod) mod continuation;
+mod continuation;
 mod lagrangian;
+mod load_state;
 mod loads;
-pub(in crate::rod) mod model;
+mod model;
 mod potential;
 mod riccati;
 mod scene;
+mod start;
 
+pub(super) use load_state::{Checkpoint, TendonTarget};
 pub use loads::Loads;
 pub use model::{LoadedRod, Scratch};
 pub use scene::Scene;

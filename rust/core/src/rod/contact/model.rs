@@ -3,15 +3,13 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::augmented_lagrangian::{Descent, Left};
-use super::continuation::{Checkpoint, REACH, TendonTarget};
-use super::lagrangian::MultiplierEstimate;
-use super::scene::{Point, Scene};
+use super::augmented_lagrangian::{Minimizer, Residuals};
+use super::load_state::{Checkpoint, TendonTarget};
+use super::scene::Scene;
 use crate::error::InvalidInput;
-use crate::lie::Pose;
 use crate::model::Contact;
 use crate::model::{Model, Report, State};
-use crate::obstacle::{Fault, FirstFault, Near};
+use crate::obstacle::{Fault, FirstFault};
 use crate::robot::Robot;
 use crate::rod::dual_newton::Ending;
 use crate::rod::model::{Rod, read_state, report, write_state};
@@ -20,7 +18,10 @@ use crate::rod::plan::Plan;
 use crate::status::Status;
 
 /// Contacts are listed up to this gap, in shares of the robot's length.
-const TOUCH: f64 = 1e-9;
+pub(super) const TOUCHING: f64 = 1e-9;
+/// Distance up to which parts of obstacles count, as a share of a subsegment.
+const DETECTION: f64 = 0.5;
+
 /// Buffers of a solve.
 ///
 /// ```
@@ -50,25 +51,25 @@ const TOUCH: f64 = 1e-9;
 /// ```
 #[derive(Debug, Default)]
 pub struct Scratch {
-    pub(in crate::rod) state: State,
-    pub(in crate::rod) descent: Descent,
+    state: State,
+    pub(in crate::rod) minimizer: Minimizer,
     /// For the compliance of the tendons at rest.
-    pub(in crate::rod) chain: NewtonSystem,
+    pub(super) chain: NewtonSystem,
     /// The last solve, or the last load that was reached.
-    pub(in crate::rod) kept: Checkpoint,
-    pub(in crate::rod) left: Left,
+    pub(in crate::rod) checkpoint: Checkpoint,
+    pub(super) residuals: Residuals,
     pub(in crate::rod) ending: Ending,
     /// Share of the load that was reached.
-    pub(in crate::rod) load: f64,
+    pub(super) load: f64,
     /// Saddles left on the way.
-    pub(in crate::rod) nudged: usize,
-    /// How deep the undeformed robot is in an obstacle, which, and at which disk.
-    pub(in crate::rod) sunk: Option<(f64, usize, usize)>,
+    pub(super) saddles_left: usize,
+    /// Depth of the undeformed robot in an obstacle, which, and at which disk.
+    pub(super) initial_penetration: Option<(f64, usize, usize)>,
     pub(in crate::rod) fault: Option<Fault>,
 }
 
 impl Scratch {
-    /// What a function of an obstacle ended the last solve with, if it did.
+    /// Takes out the fault of an obstacle's function that ended the last solve, if one did.
     pub fn take_fault(&mut self) -> Option<Fault> {
         self.fault.take()
     }
@@ -105,7 +106,7 @@ pub struct LoadedRod<'r> {
     rod: Rod<'r>,
     scene: &'r Scene,
     /// Length of the shortest subsegment \[m\].
-    pub(in crate::rod) shortest: f64,
+    pub(super) shortest: f64,
     first_fault: Option<FirstFault>,
 }
 
@@ -122,7 +123,7 @@ impl<'r> LoadedRod<'r> {
         Ok(Self { rod: Rod::new(robot, plan), scene, shortest, first_fault: None })
     }
 
-    /// The same, whose solves end soon after the flag is set, with the status of an iteration limit.
+    /// Rod whose solves end soon after the flag is set, with the status of an iteration limit.
     #[must_use]
     pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
         Self { rod: self.rod.stopped_by(stop), ..self }
@@ -149,130 +150,56 @@ impl<'r> LoadedRod<'r> {
         self.rod.plan
     }
 
-    /// Makes the contact forces of an earlier shape the estimates, where the scene still has what they name.
-    pub(in crate::rod) fn recall(&self, start: &State, work: &mut Scratch) {
-        let (plan, base) = (self.plan(), self.rod.robot.base());
-        let reach = REACH * self.shortest;
-        let mut near = Vec::new();
-        for contact in start.contacts.iter().filter(|c| c.disk < self.scene.points.len()) {
-            let same = |p: &Point| (p.kind, p.tendon) == (contact.kind, contact.tendon);
-            let points = &self.scene.points[contact.disk];
-            let (Some(p), Some(obstacle)) =
-                (points.iter().position(same), self.scene.obstacles.get(contact.obstacle))
-            else {
-                continue;
-            };
-            let at = base.inverse().transform(&contact.point);
-            let normal = base.rotation.tr_mul(&contact.normal);
-            near.clear();
-            // A fault comes again, and is told, where the shape is evaluated.
-            if obstacle.constraints(&at, reach + points[p].radius, &mut near).is_err() {
-                return;
-            }
-            let along = |part: &Near| part.gradient.dot(&normal);
-            let Some(part) = near.iter().max_by(|a, b| along(a).total_cmp(&along(b))) else {
-                continue;
-            };
-            let key = (contact.disk, p, contact.obstacle, part.feature);
-            let force = contact.force.norm() / plan.unit;
-            work.descent.estimates.forces.push(MultiplierEstimate::new(key, force, &at, part));
-        }
-        work.descent.estimates.forces.sort_by_key(|held| held.key);
-    }
-
-    /// How deep the undeformed robot is in the obstacles.
-    pub(in crate::rod) fn sink(&self, work: &mut Scratch) -> Result<(), Fault> {
-        work.sunk = None;
-        let mut frame = Pose::identity();
-        let plan = self.plan();
-        for (disk, points) in self.scene.points.iter().enumerate() {
-            if disk > 0 {
-                frame = frame.compose(&work.chain.ends[disk - 1]);
-            }
-            for point in points {
-                for (o, obstacle) in self.scene.obstacles.iter().enumerate() {
-                    let near = obstacle.nearest(&frame.transform(&point.at))?;
-                    let depth = point.radius - near.distance;
-                    let least = work.sunk.map_or(TOUCH * plan.total_length(), |(d, _, _)| d);
-                    if depth > least {
-                        work.sunk = Some((depth, o, disk));
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn finish(&self, work: &mut Scratch, evaluations: usize) -> Report {
-        self.written(work);
-        report(work.ending, work.left.worst(), evaluations)
-    }
-
-    /// The shape at hand, written out.
-    pub(in crate::rod) fn written<'w>(&self, work: &'w mut Scratch) -> &'w State {
-        let plan = self.plan();
-        let base = self.rod.robot.base();
-        let Scratch { state, descent, .. } = work;
-        let here = &descent.here;
-        write_state(state, &self.rod, &here.strains, &here.ends, &here.tensions);
-        let touch = TOUCH * plan.total_length();
-        for entry in here.entries.iter().filter(|e| e.force > 0.0 || e.gap <= touch) {
-            let (disk, p, obstacle, _) = entry.key;
-            let point = &self.scene.points[disk][p];
-            let normal = base.rotation * entry.near.gradient;
-            state.contacts.push(Contact {
-                disk,
-                kind: point.kind,
-                tendon: point.tendon,
-                obstacle,
-                point: base.transform(&entry.at),
-                normal,
-                gap: entry.gap,
-                force: normal * (entry.force * plan.unit),
-            });
-        }
-        &work.state
-    }
-
     pub(in crate::rod) fn scene(&self) -> &'r Scene {
         self.scene
     }
 
-    /// Greatest lengths of the tendons under displacements.
-    fn lengths(&self, displacements: &[f64]) -> TendonTarget {
-        let rest = &self.plan().rest_lengths;
-        TendonTarget::Lengths(rest.iter().zip(displacements).map(|(l, d)| l + d).collect())
+    /// Distance up to which parts of obstacles count \[m\].
+    pub(super) fn detection_distance(&self) -> f64 {
+        DETECTION * self.shortest
     }
 
-    /// What stands in the way of a shape without tensions; empty when nothing does.
-    pub(crate) fn hindrance(&self) -> String {
-        let mut work = Scratch::default();
-        let none = TendonTarget::Tensions(vec![0.0; self.plan().rest_lengths.len()]);
-        self.rise(&none, &mut work, self.rod.stop.as_deref());
-        self.message(&[], &work)
-    }
-
-    /// [`Model::solve`] that ends soon after another flag is set.
-    pub(crate) fn lead(
+    /// Solves as [`Model::solve`], but ends soon after another flag is set.
+    pub(crate) fn solve_until(
         &self,
         displacements: &[f64],
         work: &mut Scratch,
         stop: Option<&AtomicBool>,
     ) -> Report {
-        let report = self.rise(&self.lengths(displacements), work, stop);
+        let report = self.solve_from_rest(&self.length_bounds(displacements), work, stop);
         self.report_fault(work);
         report
     }
 
-    fn rise(&self, wanted: &TendonTarget, work: &mut Scratch, stop: Option<&AtomicBool>) -> Report {
-        self.run(work, |work, budget| {
-            self.begin(work);
-            self.sink(work)?;
-            self.climb(wanted, None, work, budget, stop)
+    /// Message of a solve without tensions: what stands in the way of any shape; empty when nothing does.
+    pub(crate) fn slack_message(&self) -> String {
+        let mut work = Scratch::default();
+        let none = TendonTarget::Tensions(vec![0.0; self.plan().rest_lengths.len()]);
+        self.solve_from_rest(&none, &mut work, self.rod.stop.as_deref());
+        self.message(&[], &work)
+    }
+
+    /// Greatest lengths of the tendons under displacements.
+    fn length_bounds(&self, displacements: &[f64]) -> TendonTarget {
+        let rest = &self.plan().rest_lengths;
+        TendonTarget::Lengths(rest.iter().zip(displacements).map(|(l, d)| l + d).collect())
+    }
+
+    fn solve_from_rest(
+        &self,
+        wanted: &TendonTarget,
+        work: &mut Scratch,
+        stop: Option<&AtomicBool>,
+    ) -> Report {
+        self.solve_in_budget(work, |work, budget| {
+            self.set_rest(work);
+            self.measure_penetration(work)?;
+            self.step_load(wanted, None, work, budget, stop)
         })
     }
 
-    fn run(
+    /// Solves in at most as many Newton steps as the settings allow, and writes the shape.
+    fn solve_in_budget(
         &self,
         work: &mut Scratch,
         solve: impl FnOnce(&mut Scratch, &mut usize) -> Result<(), Fault>,
@@ -283,9 +210,36 @@ impl<'r> LoadedRod<'r> {
         if let Err(fault) = solve(work, &mut budget) {
             work.fault = Some(fault);
             work.ending = Ending::Broken;
-            work.left.moment = f64::NAN;
+            work.residuals.moment = f64::NAN;
         }
-        self.finish(work, most - budget)
+        self.write_shape(work);
+        report(work.ending, work.residuals.largest(), most - budget)
+    }
+
+    /// Writes the shape at hand, in the world.
+    pub(in crate::rod) fn write_shape<'w>(&self, work: &'w mut Scratch) -> &'w State {
+        let plan = self.plan();
+        let base = self.rod.robot.base();
+        let Scratch { state, minimizer, .. } = work;
+        let current = &minimizer.current;
+        write_state(state, &self.rod, &current.strains, &current.ends, &current.tensions);
+        let touching = TOUCHING * plan.total_length();
+        for own in current.constraints.iter().filter(|own| own.force > 0.0 || own.gap <= touching) {
+            let (disk, p, obstacle, _) = own.key;
+            let point = &self.scene.points[disk][p];
+            let normal = base.rotation * own.near.gradient;
+            state.contacts.push(Contact {
+                disk,
+                kind: point.kind,
+                tendon: point.tendon,
+                obstacle,
+                point: base.transform(&own.position),
+                normal,
+                gap: own.gap,
+                force: normal * (own.force * plan.unit),
+            });
+        }
+        &work.state
     }
 }
 
@@ -307,23 +261,23 @@ impl Model for LoadedRod<'_> {
     }
 
     fn solve(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
-        Ok(self.lead(displacements, work, self.rod.stop.as_deref()))
+        Ok(self.solve_until(displacements, work, self.rod.stop.as_deref()))
     }
 
     fn resume(&self, displacements: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
-        let Some(from @ TendonTarget::Lengths(_)) = work.kept.given.clone() else {
+        let Some(from @ TendonTarget::Lengths(_)) = work.checkpoint.target.clone() else {
             return self.solve(displacements, work);
         };
         if work.ending != Ending::Converged {
             return self.solve(displacements, work);
         }
-        let wanted = self.lengths(displacements);
-        let report = self.run(work, |work, budget| {
-            self.climb(&wanted, Some(&from), work, budget, self.rod.stop.as_deref())
+        let wanted = self.length_bounds(displacements);
+        let report = self.solve_in_budget(work, |work, budget| {
+            self.step_load(&wanted, Some(&from), work, budget, self.rod.stop.as_deref())
         });
-        let over = work.fault.is_some() || work.ending == Ending::Stopped;
+        let is_final = work.fault.is_some() || work.ending == Ending::Stopped;
         self.report_fault(work);
-        if report.status == Status::Converged || over {
+        if report.status == Status::Converged || is_final {
             return Ok(report);
         }
         self.solve(displacements, work)
@@ -341,22 +295,27 @@ impl Model for LoadedRod<'_> {
         work: &mut Scratch,
     ) -> Result<Report, InvalidInput> {
         let plan = self.plan();
-        self.begin(work);
-        let Descent { here, estimates, .. } = &mut work.descent;
-        read_state(start, plan, &mut here.strains, &mut estimates.tensions)?;
+        self.set_rest(work);
+        let Minimizer { current, estimates, .. } = &mut work.minimizer;
+        read_state(start, plan, &mut current.strains, &mut estimates.tensions)?;
         let own = estimates.tensions.iter().zip(&plan.compliance);
-        let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, give))| l - t * give);
-        work.kept.given = Some(TendonTarget::Lengths(from.collect()));
-        // A fault comes again, and is told, where the shape is evaluated.
-        if self.sink(work).is_err() {
-            work.sunk = None;
+        let from = start.tendon_lengths.iter().zip(own).map(|(l, (t, c))| l - t * c);
+        work.checkpoint.target = Some(TendonTarget::Lengths(from.collect()));
+        // A fault comes again, and is reported, where the shape is evaluated.
+        if self.measure_penetration(work).is_err() {
+            work.initial_penetration = None;
         }
         work.ending = Ending::Converged;
-        self.recall(start, work);
+        self.recall_contacts(start, work);
         self.resume(displacements, work)
     }
 
-    /// The shape under given tensions, in the unit of the results: displacements are then what it has
+    /// Displacements under which a shape has the lengths and tensions that it has; see [`Rod::displacements`].
+    fn displacements(&self, state: &State) -> Vec<f64> {
+        self.rod.displacements(state)
+    }
+
+    /// Solves for tensions, in the unit of the results: displacements are then those of the shape
     /// ([`Self::displacements`]). Tensions, loads and contacts grow together from rest.
     ///
     /// # Errors
@@ -364,14 +323,10 @@ impl Model for LoadedRod<'_> {
     fn solve_tensions(&self, tensions: &[f64], work: &mut Scratch) -> Result<Report, InvalidInput> {
         self.plan().check_tensions(tensions)?;
         let tensions = tensions.iter().map(|tension| tension / self.plan().unit).collect();
-        let report = self.rise(&TendonTarget::Tensions(tensions), work, self.rod.stop.as_deref());
+        let target = TendonTarget::Tensions(tensions);
+        let report = self.solve_from_rest(&target, work, self.rod.stop.as_deref());
         self.report_fault(work);
         Ok(report)
-    }
-
-    /// Displacements under which a shape has the lengths and tensions that it has; see [`Rod::displacements`].
-    fn displacements(&self, state: &State) -> Vec<f64> {
-        self.rod.displacements(state)
     }
 
     fn state<'w>(&self, work: &'w Scratch) -> &'w State {
@@ -392,17 +347,17 @@ impl Model for LoadedRod<'_> {
                 Ending::Spent => "max_iterations did not suffice",
                 Ending::Stopped => "stopped",
                 Ending::Broken => "the arithmetic broke down",
-                _ if work.left.locked => "tensions or contact forces grow without bound",
+                _ if work.residuals.locked => "tensions or contact forces grow without bound",
                 _ => "no stable shape follows",
             };
             let load = 1e2 * work.load;
             parts.push(format!("{end} after {load:.1} % of the displacements and loads"));
         }
-        if work.ending == Ending::Converged && work.nudged > 0 {
-            let times = work.nudged;
+        if work.ending == Ending::Converged && work.saddles_left > 0 {
+            let times = work.saddles_left;
             parts.push(format!("unstable on the way {times} times: left where it bends easiest"));
         }
-        if let Some((depth, obstacle, disk)) = work.sunk {
+        if let Some((depth, obstacle, disk)) = work.initial_penetration {
             parts.push(format!(
                 "the undeformed robot is {depth:.3e} m deep in obstacles[{obstacle}] at disk {disk}"
             ));

@@ -7,19 +7,19 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::lie::so3::hat;
 
-/// Slope (a wrench: moment about the origin, force) and curvature of a potential by the twist.
+/// Slope W (a wrench: moment about the origin, force) and curvature Φ of a potential by the twist.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Field {
+pub(super) struct Potential {
     pub(super) slope: Vector6<f64>,
     pub(super) curvature: Matrix6<f64>,
 }
 
-impl Field {
+impl Potential {
     pub(super) fn zero() -> Self {
         Self { slope: Vector6::zeros(), curvature: Matrix6::zeros() }
     }
 
-    /// Adds a potential of a point at `x`, by its gradient and Hessian there.
+    /// Adds a potential of a point at x, by its gradient n and Hessian N there: slope `(x × n, n)`.
     pub(super) fn add_point(
         &mut self,
         x: &Vector3<f64>,
@@ -27,28 +27,29 @@ impl Field {
         hessian: &Matrix3<f64>,
     ) {
         let moment = x.cross(gradient);
-        let arm = hat(x);
-        let mixed = arm * hessian - hat(gradient) * 0.5;
-        let mut turned = gradient * x.transpose();
-        turned = (turned + turned.transpose()) * 0.5
+        let x_hat = hat(x);
+        // ωv: x̂ N - ½ n̂, and ωω: ½ (n xᵀ + x nᵀ) - (n·x) I - x̂ N x̂.
+        let mixed = x_hat * hessian - hat(gradient) * 0.5;
+        let mut turning = gradient * x.transpose();
+        turning = (turning + turning.transpose()) * 0.5
             - Matrix3::from_diagonal_element(gradient.dot(x))
-            - arm * hessian * arm;
-        add(&mut self.slope, 0, &moment);
-        add(&mut self.slope, 3, gradient);
-        let mut place = self.curvature.fixed_view_mut::<3, 3>(0, 0);
-        place += turned;
-        turned = mixed;
-        let mut place = self.curvature.fixed_view_mut::<3, 3>(0, 3);
-        place += turned;
-        let mut place = self.curvature.fixed_view_mut::<3, 3>(3, 0);
-        place += turned.transpose();
-        let mut place = self.curvature.fixed_view_mut::<3, 3>(3, 3);
-        place += hessian;
+            - x_hat * hessian * x_hat;
+        add_rows(&mut self.slope, 0, &moment);
+        add_rows(&mut self.slope, 3, gradient);
+        let mut block = self.curvature.fixed_view_mut::<3, 3>(0, 0);
+        block += turning;
+        turning = mixed;
+        let mut block = self.curvature.fixed_view_mut::<3, 3>(0, 3);
+        block += turning;
+        let mut block = self.curvature.fixed_view_mut::<3, 3>(3, 0);
+        block += turning.transpose();
+        let mut block = self.curvature.fixed_view_mut::<3, 3>(3, 3);
+        block += hessian;
     }
 
     /// Adds a couple.
     pub(super) fn add_moment(&mut self, slope: &Vector3<f64>) {
-        add(&mut self.slope, 0, slope);
+        add_rows(&mut self.slope, 0, slope);
     }
 
     pub(super) fn add(&mut self, other: &Self) {
@@ -57,18 +58,18 @@ impl Field {
     }
 }
 
-fn add(place: &mut Vector6<f64>, row: usize, value: &Vector3<f64>) {
+fn add_rows(wrench: &mut Vector6<f64>, row: usize, value: &Vector3<f64>) {
     for k in 0..3 {
-        place[row + k] += value[k];
+        wrench[row + k] += value[k];
     }
 }
 
-/// What a wrench does to the bracket of a twist with another: `x · bracket(W, θ) = W · [x, θ]`.
+/// Wrench that stands for the bracket with a twist: `x · bracket(W, θ) = W · [x, θ]`.
 pub(super) fn bracket(wrench: &Vector6<f64>, twist: &Vector6<f64>) -> Vector6<f64> {
     let part = |v: &Vector6<f64>, row: usize| Vector3::new(v[row], v[row + 1], v[row + 2]);
     let (moment, force) = (part(wrench, 0), part(wrench, 3));
-    let (spin, sweep) = (part(twist, 0), part(twist, 3));
-    let turned = spin.cross(&moment) + sweep.cross(&force);
-    let moved = spin.cross(&force);
-    Vector6::new(turned.x, turned.y, turned.z, moved.x, moved.y, moved.z)
+    let (spin, velocity) = (part(twist, 0), part(twist, 3));
+    let turning = spin.cross(&moment) + velocity.cross(&force);
+    let moving = spin.cross(&force);
+    Vector6::new(turning.x, turning.y, turning.z, moving.x, moving.y, moving.z)
 }

@@ -1,8 +1,8 @@
 //! The rod among obstacles and under loads as a function of its tensions.
 //!
-//! At a balance the contacts that push are held as equations: with G the slopes of their gaps, `G dx = 0`. The
+//! In equilibrium the contacts that push are held as equations: with G the slopes of their gaps, `G dx = 0`. The
 //! factors at hand are those of the augmented Lagrangian, which holds them by springs; forces that are found by
-//! a few answers of the same factors make up for their compliance.
+//! a few solves with the same factors make up for their compliance.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -12,28 +12,27 @@ use super::{Equilibrium, Motion, Twist};
 use crate::lie::{Pose, so3};
 use crate::model::{Model, State};
 use crate::obstacle::Fault;
-use crate::rod::contact::continuation::{Checkpoint, TendonTarget};
-use crate::rod::contact::model::{LoadedRod, Scratch};
+use crate::rod::contact::{Checkpoint, LoadedRod, Scratch, TendonTarget};
 use crate::rod::dual_newton::Ending;
 use crate::rod::model::read_state;
 
-/// Evaluations from one set of tensions to the next.
+/// Newton steps from one set of tensions to the next.
 const PATIENCE: usize = 400;
-/// Balances that are remembered: what is come back to after steps that did not help is one of them.
+/// Equilibria that are remembered: what steps that did not help come back to is one of them.
 const POINTS: usize = 8;
 
-/// A balance under tensions.
+/// An equilibrium under tensions.
 #[derive(Clone, Debug, Default)]
 struct Point {
-    kept: Checkpoint,
+    checkpoint: Checkpoint,
     tensions: Vec<f64>,
-    sound: bool,
+    converged: bool,
 }
 
 impl Point {
-    /// Largest difference of its tensions from others; infinite where it is none.
-    fn away(&self, tensions: &[f64]) -> f64 {
-        if !self.sound {
+    /// Largest difference of its tensions from others; infinite where it is no equilibrium.
+    fn distance(&self, tensions: &[f64]) -> f64 {
+        if !self.converged {
             return f64::INFINITY;
         }
         let pairs = self.tensions.iter().zip(tensions);
@@ -41,7 +40,7 @@ impl Point {
     }
 }
 
-/// A rod among obstacles under tensions, near points where it was balanced before.
+/// A rod among obstacles under tensions, near points where it was in equilibrium before.
 #[derive(Debug)]
 pub(crate) struct ContactRod<'r> {
     rod: LoadedRod<'r>,
@@ -53,21 +52,21 @@ pub(crate) struct ContactRod<'r> {
     points: [Point; POINTS],
     at: usize,
     kept: [Point; 3],
-    /// Whether the descent's shape is that of the point at hand.
-    held: bool,
-    /// By what the balance at hand lacks: displacements of the disks, twists about the base's origin, and what lengths
-    /// gain.
-    lack: (Vec<Vector6<f64>>, Vec<f64>),
+    /// True while the minimiser's shape is that of the point at hand.
+    is_current: bool,
+    /// The Newton step that is left at the point at hand: displacements of the disks, twists about the base's origin,
+    /// and changes of the tendons' lengths.
+    last_step: (Vec<Vector6<f64>>, Vec<f64>),
     motion: Motion,
-    /// What every tendon's length gains by every tension, one row per tension \[m\].
-    grown: Vec<Vec<f64>>,
+    /// Slopes of all tendons' lengths by every tension, one row per tension \[m\].
+    length_slopes: Vec<Vec<f64>>,
 }
 
 impl<'r> ContactRod<'r> {
     /// At rest, as far as obstacles and loads allow.
     pub(crate) fn new(rod: LoadedRod<'r>, stop: Option<&'r AtomicBool>) -> Self {
         let count = rod.plan().rest_lengths.len();
-        let mut leaning = Self {
+        let mut new = Self {
             rod,
             stop,
             work: Scratch::default(),
@@ -75,57 +74,57 @@ impl<'r> ContactRod<'r> {
             points: Default::default(),
             at: 0,
             kept: Default::default(),
-            held: false,
-            lack: (Vec::new(), vec![0.0; count]),
+            is_current: false,
+            last_step: (Vec::new(), vec![0.0; count]),
             motion: Motion::new(),
-            grown: vec![Vec::new(); count],
+            length_slopes: vec![Vec::new(); count],
         };
-        leaning.rest = leaning.set_out(&vec![0.0; count]);
-        leaning.reset();
-        leaning
+        new.rest = new.solve_from_rest(&vec![0.0; count]);
+        new.reset();
+        new
     }
 
-    /// Climbs from the undeformed robot, without loads; where that leads.
-    fn set_out(&mut self, tensions: &[f64]) -> Point {
+    /// Steps the load from the undeformed robot without loads.
+    fn solve_from_rest(&mut self, tensions: &[f64]) -> Point {
         let Self { rod, work, .. } = self;
-        rod.begin(work);
+        rod.set_rest(work);
         let mut budget = rod.plan().settings.max_iterations;
-        let given = TendonTarget::Tensions(tensions.to_vec());
-        let sunk = rod.sink(work);
-        let led = sunk.and_then(|()| rod.climb(&given, None, work, &mut budget, self.stop));
-        self.arrived(led, tensions.to_vec())
+        let target = TendonTarget::Tensions(tensions.to_vec());
+        let depth = rod.measure_penetration(work);
+        let solved =
+            depth.and_then(|()| rod.step_load(&target, None, work, &mut budget, self.stop));
+        self.point_of(solved, tensions.to_vec())
     }
 
-    /// The point that a climb led to.
-    fn arrived(&mut self, led: Result<(), Fault>, tensions: Vec<f64>) -> Point {
-        if let Err(fault) = led {
+    /// Steps the load from the point at hand.
+    fn solve_from_point(&mut self, tensions: &[f64]) -> Point {
+        let (rod, work) = (&self.rod, &mut self.work);
+        let from = &self.points[self.at];
+        rod.restore(&from.checkpoint, work);
+        let target = TendonTarget::Tensions(tensions.to_vec());
+        let start = TendonTarget::Tensions(from.tensions.clone());
+        let mut budget = PATIENCE.min(rod.plan().settings.max_iterations);
+        let solved = rod.step_load(&target, Some(&start), work, &mut budget, self.stop);
+        self.point_of(solved, tensions.to_vec())
+    }
+
+    /// The point that load steps led to.
+    fn point_of(&mut self, solved: Result<(), Fault>, tensions: Vec<f64>) -> Point {
+        if let Err(fault) = solved {
             self.work.fault = Some(fault);
             self.rod.report_fault(&mut self.work);
             return Point::default();
         }
-        let sound = self.work.ending == Ending::Converged;
-        if sound {
-            let (disks, lengths) = &mut self.lack;
-            self.work.descent.write_lack(self.rod.plan(), disks, lengths);
+        let converged = self.work.ending == Ending::Converged;
+        if converged {
+            let (disks, lengths) = &mut self.last_step;
+            self.work.minimizer.write_last_step(self.rod.plan(), disks, lengths);
         }
-        Point { kept: self.work.kept.clone(), tensions, sound }
-    }
-
-    /// Climbs from the point at hand; where that leads.
-    fn climb(&mut self, tensions: &[f64]) -> Point {
-        let (rod, work) = (&self.rod, &mut self.work);
-        let from = &self.points[self.at];
-        from.kept.restore(&mut work.descent);
-        rod.stiffen(work);
-        let given = TendonTarget::Tensions(tensions.to_vec());
-        let start = TendonTarget::Tensions(from.tensions.clone());
-        let mut budget = PATIENCE.min(rod.plan().settings.max_iterations);
-        let led = rod.climb(&given, Some(&start), work, &mut budget, self.stop);
-        self.arrived(led, tensions.to_vec())
+        Point { checkpoint: self.work.checkpoint.clone(), tensions, converged }
     }
 
     fn frame(&self) -> Pose {
-        let frames = &self.work.descent.here.frames;
+        let frames = &self.work.minimizer.current.frames;
         frames.last().copied().unwrap_or_else(Pose::identity)
     }
 }
@@ -133,31 +132,31 @@ impl<'r> ContactRod<'r> {
 impl Equilibrium for ContactRod<'_> {
     fn reset(&mut self) {
         for point in &mut self.points {
-            point.sound = false;
+            point.converged = false;
         }
         self.points[0].clone_from(&self.rest);
-        (self.at, self.held) = (0, false);
+        (self.at, self.is_current) = (0, false);
     }
 
     fn start_from(&mut self, start: &State) -> bool {
         self.reset();
         let (rod, work) = (&self.rod, &mut self.work);
-        rod.begin(work);
+        rod.set_rest(work);
         let (strains, mut tensions) =
-            (&mut work.descent.here.strains, vec![0.0; start.tensions.len()]);
+            (&mut work.minimizer.current.strains, vec![0.0; start.tensions.len()]);
         if read_state(start, rod.plan(), strains, &mut tensions).is_err() {
             return false;
         }
-        rod.recall(start, work);
-        let given = TendonTarget::Tensions(tensions.clone());
+        rod.recall_contacts(start, work);
+        let target = TendonTarget::Tensions(tensions.clone());
         let mut budget = PATIENCE;
-        let led = rod.climb(&given, Some(&given), work, &mut budget, self.stop);
-        let point = self.arrived(led, tensions);
-        if point.sound {
+        let solved = rod.step_load(&target, Some(&target), work, &mut budget, self.stop);
+        let point = self.point_of(solved, tensions);
+        if point.converged {
             self.points[0] = point;
-            self.held = true;
+            self.is_current = true;
         }
-        self.held
+        self.is_current
     }
 
     fn tensions(&self) -> &[f64] {
@@ -165,30 +164,30 @@ impl Equilibrium for ContactRod<'_> {
     }
 
     fn solve_at(&mut self, tensions: &[f64]) -> bool {
-        let away = self.points.each_ref().map(|point| point.away(tensions));
-        let nearest = (0..POINTS).fold(0, |best, k| if away[k] < away[best] { k } else { best });
-        if away[nearest] == 0.0 && nearest == self.at && self.held {
+        let distances = self.points.each_ref().map(|point| point.distance(tensions));
+        let nearest =
+            (0..POINTS).fold(0, |best, k| if distances[k] < distances[best] { k } else { best });
+        if distances[nearest] == 0.0 && nearest == self.at && self.is_current {
             return true;
         }
         if self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
             return false;
         }
-        self.at = nearest;
-        let known = self.points[nearest].sound;
         // Without tensions there may be no shape, where the robot rests in an obstacle or under loads.
-        let point = if known { self.climb(tensions) } else { self.set_out(tensions) };
-        self.held = point.sound;
-        if !point.sound {
+        self.at = nearest;
+        let is_known = self.points[nearest].converged;
+        let point =
+            if is_known { self.solve_from_point(tensions) } else { self.solve_from_rest(tensions) };
+        self.is_current = point.converged;
+        if !point.converged {
             return false;
         }
-        if known && away[nearest] > 0.0 {
+        // The new point takes the place of the farthest one.
+        if is_known && distances[nearest] > 0.0 {
             let others = (0..POINTS).filter(|k| *k != nearest);
-            let farthest =
-                others.fold(
-                    (nearest + 1) % POINTS,
-                    |worst, k| if away[k] > away[worst] { k } else { worst },
-                );
-            self.at = farthest;
+            self.at = others.fold((nearest + 1) % POINTS, |worst, k| {
+                if distances[k] > distances[worst] { k } else { worst }
+            });
         }
         self.points[self.at] = point;
         true
@@ -198,23 +197,23 @@ impl Equilibrium for ContactRod<'_> {
         let plan = self.rod.plan();
         let tip = self.frame();
         let mut tool = tip.compose(self.rod.robot().tool());
-        let lack = self.lack.0.last().copied().unwrap_or_default();
-        let (spin, moved) = (part(&lack, 0), part(&lack, 3));
-        tool.translation += moved + spin.cross(&tool.translation);
+        let last = self.last_step.0.last().copied().unwrap_or_default();
+        let (spin, velocity) = (part(&last, 0), part(&last, 3));
+        tool.translation += velocity + spin.cross(&tool.translation);
         tool.rotation = so3::exp(&spin) * tool.rotation;
-        let count = self.grown.len();
+        let count = self.length_slopes.len();
         let moment = self.rod.scene().moment;
         self.motion.begin(tool, count);
-        let shares = self.lack.0.windows(2).map(|w| about(&(w[1] - w[0]), &tool.translation));
-        self.motion.place(&self.work.descent.here.frames, shares);
+        let shares = self.last_step.0.windows(2).map(|w| about(&(w[1] - w[0]), &tool.translation));
+        self.motion.place(&self.work.minimizer.current.frames, shares);
         let mut all: Vec<Vec<Vector6<f64>>> = Vec::with_capacity(count);
-        for (k, grown) in self.grown.iter_mut().enumerate() {
-            all.push(self.work.descent.respond(plan, &moment, k).to_vec());
-            self.work.descent.lengthened(plan, grown);
+        for (k, slopes) in self.length_slopes.iter_mut().enumerate() {
+            all.push(self.work.minimizer.tension_response(plan, &moment, k).to_vec());
+            self.work.minimizer.write_length_response(plan, slopes);
         }
         for i in 1..=plan.data.len() {
-            for (k, moved) in all.iter().enumerate() {
-                let twist = moved[i] - moved[i - 1];
+            for (k, disks) in all.iter().enumerate() {
+                let twist = disks[i] - disks[i - 1];
                 self.motion.add(k, about(&twist, &tool.translation));
             }
             self.motion.next();
@@ -230,18 +229,18 @@ impl Equilibrium for ContactRod<'_> {
     }
 
     fn displacement(&self, k: usize) -> f64 {
-        // Under given tensions what tendons are over is counted from rest.
-        let here = &self.work.descent.here;
-        // Where an obstacle's function fails before the first balance there is none.
-        let (Some(over), Some(tension)) = (here.over.get(k), here.tensions.get(k)) else {
+        // Under given tensions the excess counts from rest.
+        let current = &self.work.minimizer.current;
+        // Where an obstacle's function fails before the first equilibrium there is none.
+        let (Some(excess), Some(tension)) = (current.excess.get(k), current.tensions.get(k)) else {
             return 0.0;
         };
-        over + self.lack.1[k] - self.rod.plan().compliance[k] * tension
+        excess + self.last_step.1[k] - self.rod.plan().compliance[k] * tension
     }
 
     fn displacement_slope(&self, k: usize, by: usize) -> f64 {
-        let give = if k == by { self.rod.plan().compliance[k] } else { 0.0 };
-        self.grown[by][k] - give
+        let compliance = if k == by { self.rod.plan().compliance[k] } else { 0.0 };
+        self.length_slopes[by][k] - compliance
     }
 
     fn save(&mut self, place: usize) {
@@ -254,7 +253,7 @@ impl Equilibrium for ContactRod<'_> {
     }
 
     fn state(&mut self) -> Option<State> {
-        self.held.then(|| self.rod.written(&mut self.work).clone())
+        self.is_current.then(|| self.rod.write_shape(&mut self.work).clone())
     }
 }
 

@@ -1,131 +1,138 @@
-//! How much of a step is taken.
+//! Line search on M: as much of a step as lowers it, without passing through an obstacle.
 
 use nalgebra::Vector3;
 
-use super::{CHANGE, Descent, SHIFT, SHIFTS, Surroundings};
+use super::{LARGEST_SHIFT, LEAST_SHIFT, Minimizer, Problem, SHIFT_FACTOR};
 use crate::lie::so3;
 use crate::obstacle::Fault;
 use crate::solve::dense::dot;
 
 /// No strain moves further in one step \[rad\].
-const STEP: f64 = 0.5;
+const LONGEST_STEP: f64 = 0.5;
 /// Halvings of a step, and the share of the predicted decrease that it must deliver.
-const BACKTRACKS: usize = 30;
+const HALVINGS: usize = 30;
 const ARMIJO: f64 = 1e-4;
-/// The same where a step looks ahead to other sets of conditions.
-const FORESIGHT: usize = 3;
-/// Share of a value that its rounding may be: steps that promise less are not judged by it.
+/// Halvings where a step is one of another active set than that of the shape.
+const PREDICTED_HALVINGS: usize = 3;
+/// Rounding of M, relative to its magnitude: steps that promise less are not judged by it.
 const ROUNDING: f64 = 1e-12;
-/// How often the way of a point in one step is cut in halves, to see whether it leads through an obstacle.
-const CUTS: usize = 8;
+/// Bisections of the path of a point, to see whether it leads through an obstacle.
+const BISECTIONS: usize = 8;
 
-impl Descent {
-    /// Takes as much of the Newton step as lowers the value; false when nothing does.
-    pub(super) fn step(&mut self, around: &Surroundings<'_>) -> Result<bool, Fault> {
-        if self.sweep.step != self.first {
-            // Sets that lie so far ahead that the step has to be cut are not worth it.
-            if self.along(around, FORESIGHT)? {
+impl Minimizer {
+    /// Takes as much of the Newton step as lowers M; false when nothing does.
+    pub(super) fn search_line(&mut self, problem: &Problem<'_>) -> Result<bool, Fault> {
+        if self.riccati.step != self.own_step {
+            // An active set so far ahead that the step has to be cut is not worth it.
+            if self.backtrack(problem, PREDICTED_HALVINGS)? {
                 return Ok(true);
             }
-            self.sweep.step.clone_from(&self.first);
+            self.riccati.step.clone_from(&self.own_step);
         }
-        self.along(around, BACKTRACKS)
+        self.backtrack(problem, HALVINGS)
     }
 
-    /// Takes as much of the step, halved so often, as lowers the value.
-    fn along(&mut self, around: &Surroundings<'_>, halvings: usize) -> Result<bool, Fault> {
-        let slope = dot(&self.slope, &self.sweep.step);
-        let longest = longest(&self.sweep.step);
+    /// Takes as much of the step, halved so often, as lowers M. A whole step that is refused is corrected once.
+    fn backtrack(&mut self, problem: &Problem<'_>, halvings: usize) -> Result<bool, Fault> {
+        let slope = dot(&self.gradient, &self.riccati.step);
+        let longest = largest_component(&self.riccati.step);
         if !slope.is_finite() || slope > 0.0 || !(longest > 0.0 && longest.is_finite()) {
             return Ok(false);
         }
-        let whole = 1.0_f64.min(STEP / longest);
+        let whole = 1.0_f64.min(LONGEST_STEP / longest);
         let mut share = whole;
         for trial in 0..halvings {
-            if self.goes_down(around, share, slope)? {
-                return Ok(self.take(share, whole));
+            if self.is_decrease(problem, share, slope)? {
+                return Ok(self.accept(share, whole));
             }
             if trial == 0 && share == 1.0 {
-                if self.correct(around) && self.goes_down(around, 1.0, slope)? {
-                    return Ok(self.take(share, whole));
+                if self.correct_step(problem) && self.is_decrease(problem, 1.0, slope)? {
+                    return Ok(self.accept(share, whole));
                 }
-                self.sweep.step.clone_from(&self.straight);
+                self.riccati.step.clone_from(&self.whole_step);
             }
             share *= 0.5;
         }
         Ok(false)
     }
 
-    fn take(&mut self, share: f64, whole: f64) -> bool {
-        self.relax(share, whole);
-        std::mem::swap(&mut self.here, &mut self.there);
+    /// Makes the trial shape the current one.
+    fn accept(&mut self, share: f64, whole: f64) -> bool {
+        self.adapt_shift(share, whole);
+        std::mem::swap(&mut self.current, &mut self.trial);
         true
     }
 
-    /// A shorter step next time if this one was cut, a longer one if not.
-    fn relax(&mut self, share: f64, whole: f64) {
+    /// Changes the shift: a shorter step next time if this one was cut, a longer one if not.
+    fn adapt_shift(&mut self, share: f64, whole: f64) {
         if share < 0.2 * whole {
-            self.shift = SHIFT.max(CHANGE * self.shift).min(SHIFTS);
+            self.shift = LEAST_SHIFT.max(SHIFT_FACTOR * self.shift).min(LARGEST_SHIFT);
         } else if share == whole {
-            self.shift = if self.shift > SHIFT { self.shift / CHANGE } else { 0.0 };
+            self.shift = if self.shift > LEAST_SHIFT { self.shift / SHIFT_FACTOR } else { 0.0 };
         }
     }
 
-    /// Evaluates `there` at a share of the step; whether that lowers the value by what the slope tells.
-    fn goes_down(
+    /// Evaluates the trial shape at a share of the step; true if M falls there by a share of what the slope promises
+    /// (Armijo) and no point goes through an obstacle.
+    fn is_decrease(
         &mut self,
-        around: &Surroundings<'_>,
+        problem: &Problem<'_>,
         share: f64,
         slope: f64,
     ) -> Result<bool, Fault> {
-        self.there.strains.clear();
-        let moved = self.here.strains.iter().zip(&self.sweep.step);
-        self.there.strains.extend(moved.map(|(own, step)| own + share * step));
-        let Surroundings { plan, scene, drive, share: loads, reach, .. } = *around;
-        self.there.evaluate(plan, scene, drive, loads, &self.estimates, reach)?;
-        let blind = -slope <= ROUNDING * self.here.size;
-        let rounding = if blind { ROUNDING } else { 1e-2 * ROUNDING };
-        let wanted = self.here.value
+        self.trial.strains.clear();
+        let ends = self.current.strains.iter().zip(&self.riccati.step);
+        self.trial.strains.extend(ends.map(|(own, step)| own + share * step));
+        self.evaluate_trial(problem)?;
+        let is_unresolved = -slope <= ROUNDING * self.current.magnitude;
+        let rounding = if is_unresolved { ROUNDING } else { 1e-2 * ROUNDING };
+        let most = self.current.value
             + ARMIJO * share * slope
-            + rounding * self.here.size
-            + self.moment_work(around);
-        let down = self.there.value <= wanted && self.passes(around)?;
-        self.blind += usize::from(down && blind);
-        Ok(down)
+            + rounding * self.current.magnitude
+            + self.moment_work(problem);
+        let falls = self.trial.value <= most && self.is_free_path(problem)?;
+        self.unresolved_steps += usize::from(falls && is_unresolved);
+        Ok(falls)
     }
 
-    /// The step that meets the conditions as they bend on the way `there`, if it is one to take, the end of the whole step, which
-    /// is kept in `straight`.
-    fn correct(&mut self, around: &Surroundings<'_>) -> bool {
-        self.straight.clone_from(&self.sweep.step);
-        self.sweep.lengthen(around.plan, &mut self.lengthened);
-        let (here, there) = (&mut self.here, &self.there);
-        let pushes: Vec<f64> = here.entries.iter().map(|entry| entry.push).collect();
-        for entry in &mut here.entries {
-            let Ok(found) = there.entries.binary_search_by(|other| other.key.cmp(&entry.key))
+    /// Second-order correction: solves for the step with gaps and lengths as they came out at the end of the whole
+    /// one, which is kept; true if it is one to take.
+    fn correct_step(&mut self, problem: &Problem<'_>) -> bool {
+        self.whole_step.clone_from(&self.riccati.step);
+        self.riccati.write_length_changes(problem.plan, &mut self.length_changes);
+        // What the gaps of the constraints changed by beyond first order.
+        let (current, trial) = (&mut self.current, &self.trial);
+        let trial_forces: Vec<f64> =
+            current.constraints.iter().map(|own| own.trial_force).collect();
+        for own in &mut current.constraints {
+            let Ok(there) = trial.constraints.binary_search_by(|other| other.key.cmp(&own.key))
             else {
                 continue;
             };
-            let bent = there.entries[found].gap - entry.gap - entry.closing(&self.sweep.moved);
-            entry.push -= bent / entry.give;
+            let gap_change = own.gap_change(&self.riccati.displacements);
+            let beyond = trial.constraints[there].gap - own.gap - gap_change;
+            own.trial_force -= beyond / own.compliance;
         }
-        let pulls = here.pulls.clone();
-        for (k, pull) in here.pulls.iter_mut().enumerate().filter(|(k, _)| self.pulling[*k]) {
-            let bent = there.over[k] - here.over[k] - self.lengthened[k];
-            *pull += bent / self.gives[k];
+        // The same of the lengths of the tendons that pull.
+        let trial_tensions = current.trial_tensions.clone();
+        let tendons = current.trial_tensions.iter_mut().enumerate();
+        for (k, tension) in tendons.filter(|(k, _)| self.pulling[*k]) {
+            let beyond = trial.excess[k] - current.excess[k] - self.length_changes[k];
+            *tension += beyond / self.compliance[k];
         }
-        self.sweep_once(around);
-        self.here.pulls = pulls;
-        for (entry, push) in self.here.entries.iter_mut().zip(pushes) {
-            entry.push = push;
+        // The step with these, and the shape as it was.
+        self.solve_newton_system(problem);
+        self.current.trial_tensions = trial_tensions;
+        for (own, trial_force) in self.current.constraints.iter_mut().zip(trial_forces) {
+            own.trial_force = trial_force;
         }
-        self.sweep.unstable.is_none() && longest(&self.sweep.step) <= STEP
+        self.riccati.unstable.is_none() && largest_component(&self.riccati.step) <= LONGEST_STEP
     }
 
-    /// Work that a moment on the tip, which has no potential, does on the way there.
-    fn moment_work(&self, around: &Surroundings<'_>) -> f64 {
-        let moment = around.scene.moment * around.share;
-        let (Some(from), Some(to)) = (self.here.frames.last(), self.there.frames.last()) else {
+    /// Work that a moment on the tip, which has no potential, does on the way to the trial shape.
+    fn moment_work(&self, problem: &Problem<'_>) -> f64 {
+        let moment = problem.scene.moment * problem.load_share;
+        let (Some(from), Some(to)) = (self.current.frames.last(), self.trial.frames.last()) else {
             return 0.0;
         };
         if moment == Vector3::zeros() {
@@ -134,12 +141,12 @@ impl Descent {
         moment.dot(&so3::log(&(to.rotation * from.rotation.transpose())))
     }
 
-    /// Whether no point can have gone through an obstacle.
-    pub(super) fn passes(&self, around: &Surroundings<'_>) -> Result<bool, Fault> {
-        let ways = self.here.spots.iter().zip(&self.there.spots);
-        for (point, (from, to)) in around.scene.points.iter().flatten().zip(ways) {
-            let Surroundings { scene, slip, sides, .. } = *around;
-            if !scene.leads(point.radius, from, to, slip, sides, CUTS)? {
+    /// Freedom of all points' paths to the trial shape: none goes through an obstacle.
+    pub(super) fn is_free_path(&self, problem: &Problem<'_>) -> Result<bool, Fault> {
+        let paths = self.current.clearances.iter().zip(&self.trial.clearances);
+        for (point, (from, to)) in problem.scene.points.iter().flatten().zip(paths) {
+            let Problem { scene, allowed_slip, keeps_side, .. } = *problem;
+            if !scene.is_free_path(point.radius, from, to, allowed_slip, keeps_side, BISECTIONS)? {
                 return Ok(false);
             }
         }
@@ -147,7 +154,7 @@ impl Descent {
     }
 }
 
-/// Largest part of a step; infinite if one is not a number.
-fn longest(step: &[f64]) -> f64 {
+/// Largest component of a step; infinite if one is not a number.
+fn largest_component(step: &[f64]) -> f64 {
     step.iter().fold(0.0, |most, s| if s.is_nan() { f64::INFINITY } else { s.abs().max(most) })
 }

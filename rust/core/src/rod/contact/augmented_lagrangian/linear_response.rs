@@ -1,70 +1,74 @@
-//! How a balanced shape goes on when a tension changes.
+//! Linear response of a shape in equilibrium to a change of a tension.
 
 use nalgebra::{Vector3, Vector6};
 
-use super::Descent;
+use super::Minimizer;
 use crate::rod::plan::Plan;
 
-/// Answers that find the change of the contact forces, each by the conditions' softness nearer to it, and the share of
+/// Solves that find the change of the contact forces, each nearer to it by the conditions' softness, and the share of
 /// a point's way that may be left across a surface.
-const ANSWERS: usize = 20;
-const LEFT: f64 = 1e-12;
+const MOST_SOLVES: usize = 20;
+const LEFT_ACROSS: f64 = 1e-12;
 
-impl Descent {
-    /// First-order displacement of every disk, a twist about the base's origin, by a unit of a tension, at the shape looked
-    /// at last, where it was balanced; contacts that push stay.
-    pub(in crate::rod) fn respond(
+impl Minimizer {
+    /// First-order displacement of every disk, a twist about the base's origin, by a unit of a tension, at the shape
+    /// that was linearised last, in equilibrium; contacts that push stay.
+    pub(in crate::rod) fn tension_response(
         &mut self,
         plan: &Plan,
         moment: &Vector3<f64>,
         tendon: usize,
     ) -> &[Vector6<f64>] {
+        // Contacts that push, and the changes of their forces, of which nothing is known at first.
         let pushing: Vec<usize> =
-            (0..self.here.entries.len()).filter(|k| self.active[*k]).collect();
+            (0..self.current.constraints.len()).filter(|k| self.active[*k]).collect();
         let mut forces = vec![0.0; pushing.len()];
         let mut slopes = vec![Vector6::zeros(); plan.data.len() + 1];
-        for _ in 0..ANSWERS {
+        for _ in 0..MOST_SOLVES {
+            // The response under these changes of the contact forces.
             slopes.fill(Vector6::zeros());
             for (force, k) in forces.iter().zip(&pushing) {
-                let entry = &self.here.entries[*k];
-                let push = entry.near.gradient * -*force;
-                let turn = entry.at.cross(&push);
-                slopes[entry.key.0] += Vector6::new(turn.x, turn.y, turn.z, push.x, push.y, push.z);
+                let own = &self.current.constraints[*k];
+                let push = own.near.gradient * -*force;
+                let turn = own.position.cross(&push);
+                slopes[own.key.0] += Vector6::new(turn.x, turn.y, turn.z, push.x, push.y, push.z);
             }
-            self.sweep.respond(plan, moment, tendon, &slopes);
+            self.riccati.respond_to_tension(plan, moment, tendon, &slopes);
+            // The forces that undo what is left of the gaps' changes.
             let (mut left, mut way) = (0.0_f64, 0.0_f64);
             for (force, k) in forces.iter_mut().zip(&pushing) {
-                let entry = &self.here.entries[*k];
-                let closing = entry.closing(&self.sweep.moved);
-                *force -= closing / entry.give;
-                left = left.max(closing.abs());
+                let own = &self.current.constraints[*k];
+                let gap_change = own.gap_change(&self.riccati.displacements);
+                *force -= gap_change / own.compliance;
+                left = left.max(gap_change.abs());
             }
-            for (moved, frame) in self.sweep.moved.iter().zip(&self.here.frames) {
-                let spin = Vector3::new(moved[0], moved[1], moved[2]);
-                let velocity = Vector3::new(moved[3], moved[4], moved[5]);
+            // Done when it is little against the way of the disks.
+            for (twist, frame) in self.riccati.displacements.iter().zip(&self.current.frames) {
+                let spin = Vector3::new(twist[0], twist[1], twist[2]);
+                let velocity = Vector3::new(twist[3], twist[4], twist[5]);
                 way = way.max((velocity + spin.cross(&frame.translation)).norm());
             }
-            if left <= LEFT * way {
+            if left <= LEFT_ACROSS * way {
                 break;
             }
         }
-        &self.sweep.moved
+        &self.riccati.displacements
     }
 
-    /// First-order displacements of the disks, twists about the base's origin, by the Newton step from where the descent
-    /// ended, and what that adds to the lengths of the tendons.
-    pub(in crate::rod) fn write_lack(
+    /// Writes first-order displacements of the disks, twists about the base's origin, by the Newton step from where the
+    /// minimisation ended, and the changes of the tendons' lengths.
+    pub(in crate::rod) fn write_last_step(
         &self,
         plan: &Plan,
         disks: &mut Vec<Vector6<f64>>,
         lengths: &mut Vec<f64>,
     ) {
-        self.sweep.lengthen(plan, lengths);
-        disks.clone_from(&self.sweep.moved);
+        self.riccati.write_length_changes(plan, lengths);
+        disks.clone_from(&self.riccati.displacements);
     }
 
-    /// What the last response adds to the length of every tendon.
-    pub(in crate::rod) fn lengthened(&self, plan: &Plan, out: &mut Vec<f64>) {
-        self.sweep.lengthen(plan, out);
+    /// Writes the changes of the tendons' lengths by the last response.
+    pub(in crate::rod) fn write_length_response(&self, plan: &Plan, out: &mut Vec<f64>) {
+        self.riccati.write_length_changes(plan, out);
     }
 }
