@@ -10,7 +10,7 @@ mod routing;
 mod settings;
 mod stepwise_tensions;
 
-pub use fit::{Fit, FitModel, FitSettings, Measured, Parameter, fit};
+pub use fit::{Fit, FitSettings, Measured, Parameter, fit};
 pub use points_on_curve::{angle_at_base, points_on_curve};
 pub use prebend::{Prebend, prebend, prebend_stopped_by};
 pub use routing::{Optimality, Routed, RoutingSettings, routing, routing_rows, routing_stopped_by};

@@ -7,11 +7,11 @@ use pyo3::types::{PyDict, PyTuple};
 use nalgebra::Vector3;
 
 use tdcr::batch::pool;
-use tdcr::design::{FitModel, FitSettings, Measured, Parameter, fit};
+use tdcr::design::{FitSettings, Measured, Parameter, fit};
 
 use crate::convert::arrays::{float_array, frozen, invalid, values};
 use crate::convert::interruptible;
-use crate::forward::model_choice::{Choice, rod_only};
+use crate::forward::model_choice::model_settings;
 use crate::robot::Robot;
 
 /// Robot, values and standard errors by name, residuals after and before, rows that failed, names at their bounds,
@@ -30,11 +30,7 @@ pub(crate) fn _fit<'py>(
     robust: bool,
     max_iterations: usize,
 ) -> PyResult<Bound<'py, PyTuple>> {
-    let model = match Choice::new(model, settings)? {
-        Choice::Rod(settings) => FitModel::Rod(settings),
-        Choice::ConstantCurvature(settings) => FitModel::ConstantCurvature(settings),
-        Choice::Linkage(_) => return Err(rod_only("parameters", model)),
-    };
+    let model = model_settings(model, settings)?;
     let kinds: Vec<Parameter> = (parameters.iter())
         .filter_map(|name| Parameter::ALL.into_iter().find(|kind| kind.as_str() == name))
         .collect();

@@ -198,7 +198,8 @@ mod tests {
     use crate::batch::{Control, pool};
     use crate::constant_curvature::{ConstantCurvatureSettings, Coupling};
     use crate::design::fit::parameters::Parameters;
-    use crate::design::{FitModel, FitSettings, Measured, fit};
+    use crate::design::{FitSettings, Measured, fit};
+    use crate::forward::ModelSettings;
     use crate::robot::{Backbone, BackboneSpec, PerDisk, Routing, Tendon};
     use crate::rod::{RodSettings, TendonLaw};
 
@@ -262,7 +263,7 @@ mod tests {
     }
 
     /// Compares derivatives with central differences of the residuals, at the robot's own values but for a turned base.
-    fn compare(robot: &Robot, model: FitModel, kinds: &[Parameter], measured: &Measured) {
+    fn compare(robot: &Robot, model: ModelSettings, kinds: &[Parameter], measured: &Measured) {
         let (pool, control) = (pool(Some(2)).unwrap(), Control::default());
         let parameters = Parameters::new(robot, kinds).unwrap();
         let predictor = Predictor { parameters, measured, model, pool: &pool, control: &control };
@@ -298,7 +299,7 @@ mod tests {
         let kinds = [Offset, Gain, Radius, Azimuth, PoissonRatio, Rest, Base];
         for points in [1, 9] {
             let measured = at_origin(&robot, &[-0.004, -0.003, -0.006, f64::INFINITY], points);
-            compare(&robot, FitModel::Rod(RodSettings::default()), &kinds, &measured);
+            compare(&robot, ModelSettings::Rod(RodSettings::default()), &kinds, &measured);
         }
     }
 
@@ -311,9 +312,9 @@ mod tests {
         for tendons in [TendonLaw::Sliding, TendonLaw::Proportional] {
             let settings = RodSettings { tendons, ..RodSettings::default() };
             // By forward passes and by adjoint ones.
-            compare(&robot, FitModel::Rod(settings), &kinds, &measured);
+            compare(&robot, ModelSettings::Rod(settings), &kinds, &measured);
             let tips = at_origin(&robot, &given, 1);
-            compare(&robot, FitModel::Rod(settings), &kinds, &tips);
+            compare(&robot, ModelSettings::Rod(settings), &kinds, &tips);
         }
     }
 
@@ -329,8 +330,10 @@ mod tests {
         .concat();
         for coupling in Coupling::ALL {
             for extensible in [false, true] {
-                let model =
-                    FitModel::ConstantCurvature(ConstantCurvatureSettings { coupling, extensible });
+                let model = ModelSettings::ConstantCurvature(ConstantCurvatureSettings {
+                    coupling,
+                    extensible,
+                });
                 // With two tendons left, the length of the first segment is one of least norm.
                 for points in [1, 8] {
                     let measured = at_origin(&robot, &given, points);
@@ -347,7 +350,7 @@ mod tests {
         let (pool, control) = (pool(None).unwrap(), Control::default());
         let points = {
             let parameters = Parameters::new(robot, &[Parameter::Gain]).unwrap();
-            let model = FitModel::Rod(RodSettings::default());
+            let model = ModelSettings::Rod(RodSettings::default());
             let predictor = Predictor {
                 parameters,
                 measured: &measured,
@@ -374,7 +377,7 @@ mod tests {
         let robot = trunk();
         let measured = measured_by_gains(&robot);
         let settings = FitSettings {
-            model: FitModel::Rod(RodSettings::default()),
+            model: ModelSettings::Rod(RodSettings::default()),
             robust: true,
             max_iterations: 50,
         };

@@ -17,28 +17,18 @@ use self::parameters::Parameters;
 use self::prediction::{Predictor, Row};
 use self::standard_errors::standard_errors;
 use crate::batch::{Control, in_row};
-use crate::constant_curvature::ConstantCurvatureSettings;
 use crate::error::InvalidInput;
+use crate::forward::ModelSettings;
 use crate::lie::Pose;
 use crate::robot::Robot;
-use crate::rod::RodSettings;
 
 pub use parameters::Parameter;
-
-/// Forward model that measurements are compared with.
-#[derive(Clone, Copy, Debug)]
-pub enum FitModel {
-    /// The rod.
-    Rod(RodSettings),
-    /// Constant curvature, which knows no stiffness, no Poisson's ratio and no rest shape.
-    ConstantCurvature(ConstantCurvatureSettings),
-}
 
 /// Choices of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct FitSettings {
-    /// The forward model.
-    pub model: FitModel,
+    /// Forward model that measurements are compared with: the rod, or constant curvature.
+    pub model: ModelSettings,
     /// A round under the soft-L1 loss after that of least squares.
     pub robust: bool,
     /// Levenberg-Marquardt steps at most, of both rounds.

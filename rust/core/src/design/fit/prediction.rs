@@ -6,12 +6,13 @@ use nalgebra::{DMatrix, DVector};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+use super::Measured;
 use super::parameters::Parameters;
-use super::{FitModel, Measured};
 use crate::batch::Control;
 use crate::constant_curvature::{self, ConstantCurvature};
 use crate::error::InvalidInput;
-use crate::model::{Model, State};
+use crate::forward::ModelSettings;
+use crate::model::{Model, State, no_derivatives};
 use crate::rod::{self, Rod};
 use crate::status::Status;
 
@@ -36,7 +37,7 @@ impl Row {
 pub(super) struct Predictor<'a> {
     pub(super) parameters: Parameters<'a>,
     pub(super) measured: &'a Measured,
-    pub(super) model: FitModel,
+    pub(super) model: ModelSettings,
     pub(super) pool: &'a ThreadPool,
     pub(super) control: &'a Control,
 }
@@ -62,14 +63,15 @@ impl Predictor<'_> {
     ) -> Result<Vec<Row>, InvalidInput> {
         let robot = self.parameters.robot(values)?;
         match self.model {
-            FitModel::Rod(settings) => {
+            ModelSettings::Rod(settings) => {
                 let plan = rod::Plan::new(&robot, settings)?;
                 let rod = Rod::new(&robot, &plan).stopped_by(self.control.stop.clone());
                 self.solve(&rod, values, chosen, derivatives, |at, work, jacobian| {
                     self.fill_by_rod(&rod, at, work, jacobian);
                 })
             }
-            FitModel::ConstantCurvature(settings) => {
+            ModelSettings::Linkage(_) => Err(no_derivatives(self.model.model())),
+            ModelSettings::ConstantCurvature(settings) => {
                 let plan = constant_curvature::Plan::new(&robot, settings)?;
                 let arcs = ConstantCurvature::new(&robot, &plan);
                 self.solve(&arcs, values, chosen, derivatives, |at, work, jacobian| {
