@@ -189,6 +189,7 @@ def test_progress_bar_goes_to_stderr():
     assert done.stdout == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "call",
     [

@@ -167,6 +167,7 @@ def test_real_processes_refuse_without_a_traceback(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_the_demo_solves_the_bundled_robots(tmp_path):
     pytest.importorskip("matplotlib")
     done = process("demo", "--output", str(tmp_path / "pictures"))

@@ -34,6 +34,7 @@ def test_every_command_has_its_examples_tried(capsys):
     assert set(listed) == {command[0] for command in COMMANDS if command}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: " ".join(command) or "tdcr")
 def test_the_examples_of_a_help_run(command, tmp_path, monkeypatch, capsys):
     pytest.importorskip("matplotlib")

@@ -19,6 +19,7 @@ def robot(tmp_path, monkeypatch):
     return save_arm(tmp_path, monkeypatch)
 
 
+@pytest.mark.slow
 def test_plot_draws_whatever_was_saved(robot, tmp_path, capsys):
     pytest.importorskip("matplotlib")
     tdcr.forward(arm(), PULL).save("shape.npz")
@@ -67,6 +68,7 @@ def test_plot_says_what_it_cannot_draw(robot, tmp_path, capsys):
     assert not (tmp_path / "p.gif").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pull", ["-10 free free", "-10 -3 free"])
 def test_an_animation_holds_its_axes_still(robot, pull, tmp_path, capsys):
     """In the plane and in space: what is no robot is the same in every frame."""

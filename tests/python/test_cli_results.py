@@ -227,6 +227,7 @@ def test_json_has_what_a_script_needs(robot, tmp_path, capsys):
             assert len(data["tendon_names"]) == len(data["displacements"]) == 3
 
 
+@pytest.mark.slow
 def test_what_a_command_writes_the_next_one_reads(robot, tmp_path, capsys):
     pytest.importorskip("matplotlib")
     place = ["0.05", "0", "0.18", "--model", "constant_curvature"]

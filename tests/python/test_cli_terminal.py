@@ -37,6 +37,7 @@ LONG = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", LONG)
 def test_interrupting_ends_with_130_and_one_line(command, robot, tmp_path):
     pytest.importorskip("matplotlib")
@@ -142,6 +143,7 @@ def piped(command, **options):
     return subprocess.run([sys.executable, "-m", "tdcr", *command], **given)
 
 
+@pytest.mark.slow
 def test_names_are_told_where_ascii_is_all_there_is(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     named = tdcr.Robot(tdcr.Backbone(0.2, 4), [tdcr.Tendon(0.0, 0.01)], name="brás Δ")
@@ -182,6 +184,7 @@ def test_a_reader_that_goes_is_no_fault(command):
     assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, b"")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
 def test_a_closed_stream_is_no_fault(stream, robot):
     code = f"import os; os.close({1 if stream == 'stdout' else 2}); import sys; "

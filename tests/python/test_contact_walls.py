@@ -72,6 +72,7 @@ def test_a_sunk_robot_is_told_with_a_start_too():
     assert "4.000e-3 m deep" in again.message
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_long_solve_in_a_mesh():
     setup = """
 import trimesh, tdcr

@@ -148,6 +148,7 @@ def line(lean, azimuth, start=0.0):
     return [start, 0.0, 0.0] + np.linspace(0.02, LENGTH, 9)[:, None] * along
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "places",
     [
@@ -168,6 +169,7 @@ def test_more_tendons_are_never_worse(places):
     assert both.rms <= one.rms * (1 + 1e-8)
 
 
+@pytest.mark.slow
 def test_bounds_that_do_not_bind_cost_nothing(known):
     draw = np.random.default_rng(2)
     for noise in (1e-3, 4e-3):
@@ -179,6 +181,7 @@ def test_bounds_that_do_not_bind_cost_nothing(known):
             assert held.rms == free.rms
 
 
+@pytest.mark.slow
 def test_the_answer_follows_its_displacements_if_any_does():
     draw = np.random.default_rng(4)
     shapes = [draw.normal(0.0, 0.1, (9, 3)) for _ in range(4)] + [np.full((9, 3), 1e3)]
@@ -201,6 +204,7 @@ def test_places_behind_the_base_are_told(tendons):
         assert "180.0 deg off the base's z axis" in message
 
 
+@pytest.mark.slow
 def test_two_tendons_do_not_depend_on_last_bits():
     places = routed([HOLES, [6, 6, 7, 8, 8, 9, 10, 10, 9, 9]], [-0.008, -0.006]).positions[1:]
     places = places + np.random.default_rng(1).uniform(-1e-3, 1e-3, (9, 3))
@@ -226,6 +230,7 @@ def test_two_tendons_do_not_depend_on_last_bits():
     assert again.rms == pytest.approx(answer.rms, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_two_tendons_come_near():
     shape = routed([HOLES, [6, 6, 7, 8, 8, 9, 10, 10, 9, 9]], [-0.008, -0.006])
     answer = design.routing(blank(2), shape.positions)
@@ -234,6 +239,7 @@ def test_two_tendons_come_near():
     assert answer.relaxed_rms <= answer.rms
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tendons", [1, 2])
 def test_no_tendon_moves_on_further_than_it_may(known, tendons):
     settings = design.RoutingSettings(max_jump=1)
@@ -367,6 +373,7 @@ def test_wrong_types(known):
         design.routing_batch(blank(), [known.positions], threads=0)
 
 
+@pytest.mark.slow
 def test_units_do_not_matter():
     # Two tendons and places that none reaches: descents over azimuths and tensions decide.
     rng = np.random.default_rng(4)
@@ -401,6 +408,7 @@ def test_ctrl_c_interrupts(call):
     assert_interrupts(setup, f"design.{call}")
 
 
+@pytest.mark.slow
 def test_the_example_draws_what_is_kept(tmp_path):
     pytest.importorskip("matplotlib")
     root = Path(__file__).resolve().parents[2]

@@ -99,6 +99,7 @@ def test_the_papers_choices_differ_as_the_guide_says(example, shapes):
             assert np.abs(off).max() < 1e-10
 
 
+@pytest.mark.slow
 def test_every_picture_is_drawn_with_its_disks(example, tmp_path):
     example.figures(tmp_path)
     names = {path.name for path in tmp_path.iterdir()}

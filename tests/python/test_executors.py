@@ -107,6 +107,7 @@ def test_errors_of_a_solve_are_not_tried_again():
     assert len(calls) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
 def test_a_dask_cluster_gives_the_same_rows_when_a_worker_is_killed_too():
     distributed = pytest.importorskip("distributed")

@@ -158,6 +158,7 @@ def robots(draw):
     return Robot(backbone, tendons, base=draw(place), tool=draw(place), name=draw(name))
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(robots(), st.sampled_from([".toml", ".json"]))
 def test_load_gives_back_what_save_wrote(tmp_path_factory, robot, ending):

@@ -118,6 +118,7 @@ def test_radii_alone_and_outliers():
     assert np.isnan(answers[0].rms("validation"))
 
 
+@pytest.mark.slow
 def test_poisson_ratio_and_base_of_a_winding_tendon():
     base = np.eye(4)
     turn = 0.1
@@ -155,6 +156,7 @@ def test_what_the_data_do_not_tell_has_no_error():
     assert answer.rms() < 2 * NOISE
 
 
+@pytest.mark.slow
 def test_the_stiffness_of_tendons_is_found():
     known = {"stiffness": np.array([700.0, 2500.0]), "gain": np.array([0.95, 1.04])}
     start = elastic()
@@ -297,6 +299,7 @@ def test_rows_that_no_shape_has_are_told():
     assert "the forward solve of 5 of 5 rows did not converge" in found.message
 
 
+@pytest.mark.slow
 def test_the_measured_robot_is_fitted_as_the_guide_says():
     pytest.importorskip("matplotlib")
     root = Path(__file__).resolve().parents[2]

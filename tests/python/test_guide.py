@@ -53,6 +53,7 @@ def run_commands(block):
     assert code == 0, f"exit code {code}, which no `echo $?` shows"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", CODED, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch):
     text = page.read_text(encoding="utf-8")
@@ -98,6 +99,7 @@ def site(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", ["", *MODULES])
 def test_the_built_reference_has_every_public_name(site, module):
     inventory = (site / "objects.inv").read_bytes().split(b"\n", 4)[4]
@@ -107,6 +109,7 @@ def test_the_built_reference_has_every_public_name(site, module):
     assert public - {f"tdcr.{name}" for name in MODULES} <= documented
 
 
+@pytest.mark.slow
 def test_the_site_fetches_nothing(site):
     """Links lead out of it; scripts, styles, pictures and formulas do not."""
     loads = (

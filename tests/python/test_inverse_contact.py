@@ -212,6 +212,7 @@ def test_an_interrupt_ends_long_searches(call):
     assert_interrupts(LONG, call)
 
 
+@pytest.mark.slow
 def test_swarms_are_few_and_lose_nothing_against_descents():
     bone = tdcr.Backbone([0.06] * 3, [4] * 3, youngs_modulus=200e9, diameter=0.001)
     ends = [4 * (k // 3 + 1) for k in range(9)]
@@ -226,6 +227,7 @@ def test_swarms_are_few_and_lose_nothing_against_descents():
     assert errors[1] < errors[0] + 1e-4
 
 
+@pytest.mark.slow
 def test_only_the_first_starts_among_obstacles_are_swarms():
     bone = tdcr.Backbone(0.06, 3, youngs_modulus=200e9, diameter=0.001)
     finger = tdcr.Robot(bone, [tdcr.Tendon(2.1 * k, 0.008) for k in range(3)])

@@ -60,6 +60,7 @@ def test_what_comes_nearest_is_a_minimum_like_that_of_scipy():
         assert square(answer, wanted) <= 2 * min(peer.cost for peer in peers) * (1 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tendons", "disks"), [(12, 2), (2, 2), (4, 4)])
 def test_long_subsegments_that_may_coil_are_not_left_so(tendons, disks):
     draw = np.random.default_rng(0)

@@ -244,6 +244,7 @@ def path(count=300):
     return rows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("warm", [False, True])
 def test_rows_of_a_batch_are_shapes_to_the_bit(warm):
     robot, settings = winding(steel()), tdcr.RodSettings(elements=2)

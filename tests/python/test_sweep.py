@@ -42,6 +42,7 @@ def around(model):
     return {"obstacles": BALL} if model == "rod" else {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunk", [1, 64, 99, 300, 10**9])
 def test_the_rows_are_those_of_a_batch(robot, pulls, chunk, tmp_path):
     pulls = pulls[: 40 if chunk == 1 else 300]
@@ -62,6 +63,7 @@ def test_the_rows_are_those_of_a_batch(robot, pulls, chunk, tmp_path):
     assert os.listdir(tmp_path) == ["s.npz"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["rod", "linkage", "constant_curvature"])
 def test_a_table_is_that_of_a_batch_with_a_row_group_per_chunk(robot, pulls, model, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
@@ -237,6 +239,7 @@ def test_misuse_is_refused_before_a_row_is_solved(robot, keywords, error, text, 
     assert os.listdir(tmp_path) == ["folder.npz"]
 
 
+@pytest.mark.slow
 def test_functions_of_obstacles_go_into_tables(robot, pulls, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     ball = tdcr.SignedDistance(lambda p: float(np.linalg.norm(p - BALL.center)) - BALL.radius)
@@ -301,6 +304,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ending", "rows"), [("npz", 60_000), ("parquet", 200_000)])
 def test_memory_does_not_grow_with_the_rows(ending, rows, tmp_path):
     """The results alone are 60,000 x 31 frames of 128 bytes or 200,000 x 31 x 24: 240 or 150 MB."""

@@ -95,6 +95,7 @@ def test_a_fixed_robot_has_one_row():
     assert found.volume().value == 0.0
 
 
+@pytest.mark.slow
 def test_failed_rows_are_counted_and_kept_apart():
     robot = tdcr.Robot(tdcr.Backbone(0.2, 6), [tdcr.Tendon(k * math.pi, 0.01) for k in range(2)])
     found = tdcr.workspace(robot, [(-0.02, 0.01)] * 2, 400, sampling="grid")
@@ -141,6 +142,7 @@ def test_the_volume_is_that_of_the_map_from_displacements():
     assert abs(found.value / exact - 1) < 0.06
 
 
+@pytest.mark.slow
 def test_a_surface_and_a_hollow_ball_have_the_volume_they_have():
     surface = tdcr.workspace(STRETCH, [(-0.01, 0.01)] * 3, 2**15, **MODEL).volume()
     assert surface.value < 0.1 * surface.occupied

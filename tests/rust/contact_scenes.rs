@@ -281,7 +281,6 @@ fn many(count: usize, every: usize) -> f64 {
     good as f64 / done as f64
 }
 
-#[test]
 fn a_thousand_random_scenes() {
     // 997 as measured; the rest is flagged.
     assert!(many(300, 10) > 0.99);
@@ -292,3 +291,5 @@ fn a_thousand_random_scenes() {
 fn ten_thousand_random_scenes() {
     assert!(many(10_000, 50) > 0.99);
 }
+
+crate::common::slow!(a_thousand_random_scenes,);

@@ -56,7 +56,6 @@ fn blank(tendons: usize) -> Robot {
     robot(9, &vec![vec![0; 10]; tendons], 12)
 }
 
-#[test]
 fn known_holes_are_found() {
     for (jump, wanted) in [(1, 40), (2, 200), (3, 40), (6, 40)] {
         let mut draw = ChaCha8Rng::seed_from_u64(1);
@@ -80,7 +79,6 @@ fn known_holes_are_found() {
     }
 }
 
-#[test]
 fn holes_of_two_tendons_come_near() {
     let mut draw = ChaCha8Rng::seed_from_u64(2);
     let (mut drawn, mut near, mut reached, mut left) = (0, 0, 0, Vec::new());
@@ -162,7 +160,6 @@ fn every_routing_of_a_small_robot_is_tried() {
     }
 }
 
-#[test]
 fn wider_beams_find_nothing_nearer() {
     let mut draw = ChaCha8Rng::seed_from_u64(4);
     for _ in 0..6 {
@@ -181,7 +178,6 @@ fn wider_beams_find_nothing_nearer() {
     }
 }
 
-#[test]
 fn any_azimuth_and_radius_reach_what_holes_do() {
     let mut draw = ChaCha8Rng::seed_from_u64(5);
     for radius in [None, Some((4e-3, 12e-3))] {
@@ -197,7 +193,6 @@ fn any_azimuth_and_radius_reach_what_holes_do() {
     }
 }
 
-#[test]
 fn displacements_stay_within_bounds() {
     let mut draw = ChaCha8Rng::seed_from_u64(6);
     let (_, pulls, places) = known(&mut draw, 1, 2).unwrap();
@@ -251,3 +246,11 @@ fn a_flag_ends_a_design() {
         assert_eq!(answer.status, Status::IterationLimit);
     }
 }
+
+crate::common::slow!(
+    any_azimuth_and_radius_reach_what_holes_do,
+    displacements_stay_within_bounds,
+    holes_of_two_tendons_come_near,
+    known_holes_are_found,
+    wider_beams_find_nothing_nearer,
+);

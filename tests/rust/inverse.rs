@@ -197,7 +197,6 @@ fn one_segment_is_solved_at_once() {
 
 /// Every answer of a batch is the one of a solve alone, bit by bit, on any number of threads; some targets
 /// are out of reach.
-#[test]
 fn batches_equal_single_solves_on_any_number_of_threads() {
     let robot = trunk();
     for extensible in [false, true] {
@@ -332,7 +331,6 @@ fn same(a: &[Arc], b: &[Arc]) -> bool {
 
 /// All answers for random poses: each meets the target, none twice, in order; how often the arcs that the
 /// pose was made of are among them.
-#[test]
 fn solutions_are_distinct_and_most_are_found() {
     let robot = trunk();
     let plan = plan(&robot, false);
@@ -369,3 +367,8 @@ fn solutions_are_distinct_and_most_are_found() {
         assert!(100 * among >= 95 * targets);
     }
 }
+
+crate::common::slow!(
+    batches_equal_single_solves_on_any_number_of_threads,
+    solutions_are_distinct_and_most_are_found,
+);

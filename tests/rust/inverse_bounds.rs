@@ -106,7 +106,6 @@ fn out_of_reach(extensible: bool, posed: bool) {
     );
 }
 
-#[test]
 fn targets_out_of_reach_get_the_nearest_pose() {
     out_of_reach(false, false);
     out_of_reach(false, true);
@@ -163,7 +162,6 @@ fn weights_choose_what_counts() {
 }
 
 /// Rows of bounds on displacement, curvature and length, met to 1e-12 of them.
-#[test]
 fn active_bounds_are_kept() {
     let robot = trunk();
     let mut u = uniform(73);
@@ -390,3 +388,5 @@ fn singular_targets_are_solved() {
         }
     }
 }
+
+crate::common::slow!(active_bounds_are_kept, targets_out_of_reach_get_the_nearest_pose,);

@@ -100,7 +100,6 @@ fn tip(shape: &Shape) -> &Pose {
 
 /// 2,000 positions and 1,000 poses of robots with one to three segments, straight and helical: all are met, and
 /// forward solves from rest agree.
-#[test]
 fn random_targets_are_met() {
     let settings = RodSettings::default();
     for (segments, turns, posed, count) in [
@@ -274,7 +273,6 @@ fn out_of_reach_is_the_nearest_answer() {
 }
 
 /// Bounds on displacements and tensions hold, whether the target is met or not; what they leave is used.
-#[test]
 fn bounds_hold() {
     let robot = rod_trunk(3, 0.0);
     let plan = rod_plan(&robot);
@@ -387,3 +385,5 @@ fn freedom_goes_to_the_least_tensions() {
         }
     }
 }
+
+crate::common::slow!(bounds_hold, random_targets_are_met,);

@@ -15,7 +15,6 @@ use crate::common::{FREE, robot, try_solve};
 
 /// Pairs of differing holes pulled anywhere: every one is solved or infeasible with a stationary
 /// violation, and the infeasible ones are so from other starts too.
-#[test]
 fn unreachable_pairs_are_infeasible() {
     let mut rng = ChaCha8Rng::seed_from_u64(22);
     let mut u = move |low: f64, high: f64| rng.random_range(low..high);
@@ -130,3 +129,5 @@ fn random_robots_are_solved_or_honestly_flagged() {
     assert_eq!(gentle_solved, gentle);
     assert!(refused < 10);
 }
+
+crate::common::slow!(unreachable_pairs_are_infeasible,);

@@ -147,7 +147,6 @@ fn limits_hold() {
 }
 
 /// Out of reach: the nearest point, and the gradient of the distance vanishes there.
-#[test]
 fn nearest_points() {
     let two = TwoSections::new(0.14, 0.12, TAU).unwrap();
     let (turns, distance) = two.nearest(0.3, 0.0);
@@ -302,3 +301,5 @@ fn nearest_points_to_far_targets() {
         assert!(ahead(got) > most - 1e-6, "{case} {angle} {got:?} {} {most}", ahead(got));
     }
 }
+
+crate::common::slow!(nearest_points,);

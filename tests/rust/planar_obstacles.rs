@@ -38,7 +38,6 @@ fn clearances_are_those_of_dense_samples() {
 
 /// Three sections among two circles: on the target, clear of them, and with no more energy than a scan
 /// of the first turn with the exact solutions of the rest finds among what is clear.
-#[test]
 fn three_sections_among_circles() {
     let lengths = [0.1, 0.08, 0.12];
     let trunk = trunk(&lengths);
@@ -144,7 +143,6 @@ fn covered_by_nothing() -> Vec<Circle> {
 }
 
 /// Headings and limits hold among circles too.
-#[test]
 fn headings_among_circles() {
     let mut solved = 0;
     for case in 0..30 {
@@ -181,3 +179,5 @@ fn bad_circles_name_the_argument() {
     assert_eq!(argument(&two, &circles), "obstacles");
     assert_eq!(argument(&trunk(&[0.1]), &[]), "objective");
 }
+
+crate::common::slow!(headings_among_circles, three_sections_among_circles,);

@@ -88,7 +88,6 @@ fn the_path_of_the_paper() {
 
 /// 1,000,000 targets reached by turns within 2 pi: the turns that made them are always found, or at a
 /// fold a pair with the same tip to 1e-12; every answer hits its target to 1e-12 of the length.
-#[test]
 fn a_million_random_targets() {
     let jobs: Vec<u64> = (0..1000).collect();
     let per_job = 1000;
@@ -301,7 +300,6 @@ fn bad_sections_name_the_argument() {
 
 /// Where the equation is at its worst: turns near 2 pi and near zero, sections up to 10,000 times apart.
 /// The turns that made the target are found, and the work stays bounded.
-#[test]
 fn hard_targets_take_little_more() {
     let count = 2000;
     let job = |job: u64| {
@@ -354,3 +352,5 @@ fn extreme_lengths_end() {
     println!("at most {most} intervals");
     assert!(most < 10_000);
 }
+
+crate::common::slow!(a_million_random_targets, hard_targets_take_little_more,);

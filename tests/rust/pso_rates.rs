@@ -8,7 +8,6 @@ use tdcr::solve::pso::{Pointwise, PsoSettings, Topology};
 use super::pso::{kinds, rastrigin, rosenbrock, sphere, swarm};
 
 /// Runs of many seeds that reach 1e-8, with the rates stated in docs/pso.md.
-#[test]
 fn minima_are_found_at_the_stated_rates() {
     type Case = (&'static str, fn(&[f64]) -> f64, f64, usize, [usize; 5]);
     let cases: [Case; 5] = [
@@ -92,3 +91,5 @@ fn the_ball_does_not_care_for_rotations() {
     assert!(ball.abs() < 0.3, "{ball}");
     assert!(boxes > 1.0, "{boxes}");
 }
+
+crate::common::slow!(minima_are_found_at_the_stated_rates,);

@@ -62,9 +62,9 @@ fn a_large_solve_ends_within_one_evaluation() {
 }
 
 /// An obstacle by a function counts how often it is asked and sets the flag on the way: what is asked after
-/// that is less than one evaluation of the rod.
+/// that is no more than a step asks, of which the whole solve takes over ten.
 #[test]
-fn a_flag_that_is_set_on_the_way_ends_the_solve_within_one_evaluation() {
+fn a_flag_that_is_set_on_the_way_ends_the_solve_within_one_step() {
     let mut case = Case::new(helix(20));
     let stop = Arc::new(AtomicBool::new(false));
     let (asked, when) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicUsize::new(usize::MAX)));
@@ -94,7 +94,7 @@ fn a_flag_that_is_set_on_the_way_ends_the_solve_within_one_evaluation() {
         let (report, asked) = solve(at);
         println!("{report:?} {} of {all} after {at}", asked - at);
         assert_eq!(report.status, Status::IterationLimit);
-        assert!(report.iterations < whole.iterations && asked - at <= 2100, "{at} {asked}");
+        assert!(report.iterations < whole.iterations && asked - at <= all / 10, "{at} {asked}");
     }
     // The scratch of one solve does not matter to the next.
     assert_eq!(solve(usize::MAX), (whole, all));

@@ -120,7 +120,6 @@ fn random_program(kind: usize, u: &mut impl FnMut(f64, f64) -> f64) -> Program {
     Program { size, hessian, gradient, normals, offsets, equalities }
 }
 
-#[test]
 fn quadratic_programs_match_the_enumeration_of_active_sets() {
     let mut u = uniform(41);
     let mut work = QuadraticProgram::default();
@@ -194,3 +193,5 @@ fn nearly_singular_programs_are_solved_in_a_box() {
         assert!(left.amax() < 1e-8, "{case} {left}");
     }
 }
+
+crate::common::slow!(quadratic_programs_match_the_enumeration_of_active_sets,);

@@ -125,6 +125,7 @@ fn export<'py>(
         let array = frozen(py, column.values, &shape)?;
         let name = column.key.field().as_str();
         match column.key {
+            // The list made above has an array per tendon.
             Key::TendonPoints(_) => {
                 if let Some(list) = answer.get_item(name)? {
                     list.cast::<PyList>()?.append(array)?;

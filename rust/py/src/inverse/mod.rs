@@ -177,6 +177,7 @@ pub(crate) fn _inverse(
     let around = Surroundings::new(py, Some(obstacles), loads)?;
     let plans = Plans::new(robot, model, settings, &around)?;
     let engine = plans.engine(robot, bounds, search, method)?;
+    // Solve where Ctrl-C can stop it, unless all its steps end soon.
     let found = match (&engine, positions) {
         (Engine::Arcs(_), Some(_)) => return Err(invalid(&rod_only("positions", model))),
         (Engine::Arcs(inverse), None) => {
@@ -198,6 +199,7 @@ pub(crate) fn _inverse(
             found
         }
     };
+    // A shape of its own where several have these displacements.
     let found = found.map_err(|e| invalid(&e))?;
     with_shape(py, robot, found, model_settings(model, settings)?, around)
 }
