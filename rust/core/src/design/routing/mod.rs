@@ -1,6 +1,7 @@
 //! Routing design: the holes and pulls that bring a given backbone nearest to a wanted shape. The mathematics is
 //! in `docs/design.md`.
 
+mod answer;
 mod beam_search;
 mod best_tensions;
 mod canonical_task;
@@ -25,9 +26,9 @@ use nalgebra::Vector3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use self::canonical_task::{Posed, radii};
-use self::fewer_tendons::Designs;
-use self::result::told;
+use self::canonical_task::{CanonicalTask, radii};
+use self::fewer_tendons::TendonSubsets;
+use self::result::in_robot_frame;
 use self::task::Task;
 use crate::batch::Control;
 use crate::error::InvalidInput;
@@ -39,10 +40,7 @@ use crate::status::Status;
 
 pub use settings::RoutingSettings;
 
-/// Wanted places are no further from the base than so many lengths: beyond, distances to all shapes round to the same.
-const FARTHEST: f64 = 1e6;
-
-/// What is known about the nearest routing.
+/// Knowledge about the nearest routing.
 ///
 /// ```
 /// use tdcr::design::Optimality;
@@ -102,9 +100,9 @@ pub struct Routed {
     pub errors: Vec<f64>,
     /// Root mean square distance of disks 1 to n \[m\].
     pub rms: f64,
-    /// The same of the nearest routing with any azimuth that a descent from this one led to \[m\].
+    /// Root mean square distance of the nearest routing with any azimuth that a descent from this one led to \[m\].
     pub relaxed_rms: f64,
-    /// What is known about there being a nearer one.
+    /// Knowledge about there being a nearer one.
     pub optimality: Optimality,
     /// Steps of descents and rounds of the search.
     pub iterations: usize,
@@ -112,14 +110,14 @@ pub struct Routed {
     pub evaluations: usize,
     /// Converged: every disk is in its place; unreachable: the nearest routing that was found.
     pub status: Status,
-    /// What stood in the way, or empty.
+    /// Message about what stood in the way, or empty.
     pub message: String,
 }
 
 /// The holes and displacements under which the disks 1 to n of a robot are nearest to `targets` (in the world
 /// \[m\]): least sum of squared distances. Backbone, ends, stiffness and names of the tendons are the robot's, and
-/// their radii unless the settings bound them; displacements stay within `bounds` \[m\]. A routed robot and its tensions
-/// may be what is looked at first.
+/// their radii unless the settings bound them; displacements stay within `bounds` \[m\]. A routed robot and its
+/// tensions may be looked at first.
 ///
 /// # Errors
 /// `InvalidInput` for another number of targets than subsegments, places that are not finite, a robot without
@@ -134,7 +132,7 @@ pub fn routing(
     routing_stopped_by(robot, targets, bounds, start, settings, &Arc::default())
 }
 
-/// The same, which ends soon after the flag is set, with the status of an iteration limit.
+/// [`routing`] that ends soon after the flag is set, with the status of an iteration limit.
 ///
 /// # Errors
 /// As [`routing`].
@@ -151,9 +149,9 @@ pub fn routing_stopped_by(
     let plan = Plan::new(robot, settings.rod)?;
     let radii = (0..robot.tendons().len()).map(|k| radii(robot, k)).collect();
     let task = Task { robot, targets, bounds, settings, stop, plan, radii };
-    let posed = Posed::new(robot, targets, bounds, start, settings)?;
-    let (answer, counted) = Designs::new(&posed, stop).run()?;
-    told(&task, &posed, &answer, counted)
+    let canonical = CanonicalTask::new(robot, targets, bounds, start, settings)?;
+    let (answer, counted) = TendonSubsets::new(&canonical, stop).run()?;
+    in_robot_frame(&task, &canonical, &answer, counted)
 }
 
 fn check(
@@ -167,14 +165,6 @@ fn check(
         return Err(InvalidInput::new("robot", "at least one tendon to route", "none"));
     }
     super::check_targets(robot, targets)?;
-    let (base, far) = (robot.base().translation, FARTHEST * robot.backbone().total_length());
-    if let Some(i) = targets.iter().position(|target| (target - base).amax() > far) {
-        let expected = format!(
-            "places within {far:.3e} m of the base, {FARTHEST:.0e} times the robot's length"
-        );
-        let got = format!("{:?} for disk {}", targets[i].as_slice(), i + 1);
-        return Err(InvalidInput::new("target_positions", expected, got));
-    }
     if let Some(bounds) = bounds {
         let (lower, upper) = bounds.values();
         for count in [lower.len(), upper.len()] {

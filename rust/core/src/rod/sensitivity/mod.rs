@@ -57,6 +57,8 @@ pub struct Change {
     pub lengths: Vec<f64>,
     /// Change of Poisson's ratio.
     pub poisson_ratio: f64,
+    /// Relative change of each tendon's stiffness EA; nothing where tendons do not stretch.
+    pub stiffness: Vec<f64>,
 }
 
 /// Variation of the shape by a change.
@@ -277,6 +279,7 @@ impl Sensitivity<'_> {
             holes: holes.collect(),
             lengths: vec![0.0; n],
             poisson_ratio: 0.0,
+            stiffness: vec![0.0; self.at.displacements.len()],
         }
     }
 }
