@@ -249,6 +249,7 @@ impl Design<'_> {
         if self.settings.max_bend < PI {
             rods.extend(NearestRodProblem { most: self.settings.max_bend, ..problem }.minima(own)?);
         }
+        // What follows and is as near as lengths allow ends the search.
         let enough = least * (1.0 + ENOUGH);
         let done = |candidate: &Candidate| Self::rank(candidate) <= (false, enough);
         // Starts: rest shapes whose places under tension are those of the nearest rods.

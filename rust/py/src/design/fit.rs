@@ -31,6 +31,7 @@ pub(crate) fn _fit<'py>(
     max_iterations: usize,
 ) -> PyResult<Bound<'py, PyTuple>> {
     let model = model_settings(model, settings)?;
+    // Parameters by name; Python has checked them.
     let kinds: Vec<Parameter> = (parameters.iter())
         .filter_map(|name| Parameter::ALL.into_iter().find(|kind| kind.as_str() == name))
         .collect();

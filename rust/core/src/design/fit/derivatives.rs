@@ -376,11 +376,7 @@ mod tests {
     fn fits_are_the_same_on_any_number_of_threads_and_can_be_stopped() {
         let robot = trunk();
         let measured = measured_by_gains(&robot);
-        let settings = FitSettings {
-            model: ModelSettings::Rod(RodSettings::default()),
-            robust: true,
-            max_iterations: 50,
-        };
+        let settings = FitSettings::default();
         let run = |threads, control: &Control| {
             let pool = pool(Some(threads)).unwrap();
             fit(&robot, &measured, &[Parameter::Gain], &settings, &pool, control).unwrap()

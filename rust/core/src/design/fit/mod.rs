@@ -2,6 +2,7 @@
 
 mod derivatives;
 mod least_squares;
+mod measured;
 mod parameters;
 mod prediction;
 mod standard_errors;
@@ -16,15 +17,19 @@ use self::least_squares::{Iterate, Loss};
 use self::parameters::Parameters;
 use self::prediction::{Predictor, Row};
 use self::standard_errors::standard_errors;
-use crate::batch::{Control, in_row};
+use crate::batch::Control;
 use crate::error::InvalidInput;
 use crate::forward::ModelSettings;
-use crate::lie::Pose;
 use crate::robot::Robot;
 
+pub use measured::Measured;
 pub use parameters::Parameter;
 
 /// Choices of a fit.
+///
+/// ```
+/// assert!(tdcr::design::FitSettings::default().robust);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct FitSettings {
     /// Forward model that measurements are compared with: the rod, or constant curvature.
@@ -35,59 +40,13 @@ pub struct FitSettings {
     pub max_iterations: usize,
 }
 
-/// Measured rows without gaps.
-#[derive(Clone, Debug)]
-pub struct Measured {
-    /// Displacements of each row, one after the other \[m\]; `inf` is free.
-    pub displacements: Vec<f64>,
-    /// Points of each row in the world, one after the other: the tool point alone, or every disk, the base first \[m\].
-    pub points: Vec<Vector3<f64>>,
-    /// Rows that are not fitted to, one entry per row.
-    pub held_out: Vec<bool>,
-}
-
-impl Measured {
-    /// Displacements and points of a row.
-    fn row(&self, row: usize) -> (&[f64], &[Vector3<f64>]) {
-        let rows = self.held_out.len();
-        let (tendons, points) = (self.displacements.len() / rows, self.points.len() / rows);
-        let displacements = &self.displacements[row * tendons..(row + 1) * tendons];
-        (displacements, &self.points[row * points..(row + 1) * points])
-    }
-
-    /// Disks whose points were measured, each with the point in its frame.
-    fn marks(&self, robot: &Robot) -> Vec<(usize, Pose)> {
-        let n = robot.backbone().subsegments();
-        if self.points.len() == self.held_out.len() {
-            return vec![(n, *robot.tool())];
-        }
-        (0..=n).map(|disk| (disk, Pose::identity())).collect()
-    }
-
-    fn check(&self, robot: &Robot, unknowns: usize) -> Result<(), InvalidInput> {
-        let (rows, disks) = (self.held_out.len(), robot.backbone().subsegments() + 1);
-        if self.displacements.len() != rows * robot.tendons().len() {
-            let expected = format!("{rows} rows, one value per tendon");
-            return Err(InvalidInput::new("displacements", expected, self.displacements.len()));
-        }
-        if self.points.len() != rows && self.points.len() != rows * disks {
-            let expected = format!("{rows} points, or {}, one per row and disk", rows * disks);
-            return Err(InvalidInput::new("measurements", expected, self.points.len()));
-        }
-        for row in 0..rows {
-            robot.check_displacements(self.row(row).0).map_err(|error| in_row(error, row))?;
-        }
-        let fitted = self.held_out.iter().filter(|held| !**held).count();
-        let numbers = fitted * 3 * self.points.len().checked_div(rows).unwrap_or(0);
-        if numbers <= unknowns {
-            let expected = format!("more numbers to fit to than unknowns ({unknowns})");
-            return Err(InvalidInput::new("measurements", expected, numbers));
-        }
-        Ok(())
+impl Default for FitSettings {
+    fn default() -> Self {
+        Self { model: ModelSettings::default(), robust: true, max_iterations: 50 }
     }
 }
 
-/// Parameters fitted to measurements.
+/// Parameters fitted to measurements; see [`fit`].
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The robot with its fitted holes, stiffness, rest shape, Poisson's ratio and base.
@@ -116,6 +75,34 @@ const MEDIANS: f64 = 2.0;
 const LEAST_SCALE: f64 = 1e-9;
 
 /// Fit of some parameters of a robot to measured rows, on `pool`; nothing when it was stopped.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tdcr::batch::{Control, Field, Key, pool, solve_rows};
+/// use tdcr::design::{FitSettings, Measured, Parameter, fit};
+/// use tdcr::rod::{Plan, Rod, RodSettings};
+/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
+/// # fn main() -> Result<(), tdcr::InvalidInput> {
+/// # let robot = |radius| {
+/// #     let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
+/// #     Robot::new(backbone, vec![Tendon::straight(0.0, radius)?], None, None, None)
+/// # };
+/// let (real, given, pool) = (robot(0.0104)?, robot(0.01)?, pool(None)?);
+/// let displacements = vec![-0.002, -0.004, -0.006];
+/// let plan = Plan::new(&real, RodSettings::default())?;
+/// let fields = [Field::Positions];
+/// let control = Control::default();
+/// let seen = solve_rows(&Rod::new(&real, &plan), &displacements, 3, &fields, &pool, &control)?;
+/// let seen = seen.unwrap_or_default();
+/// let points = seen.values(Key::Positions).unwrap_or_default().chunks_exact(3);
+/// let points = points.map(Vector3::from_column_slice).collect();
+/// let measured = Measured { displacements, points, held_out: vec![false; 3] };
+/// let settings = FitSettings::default();
+/// let found = fit(&given, &measured, &[Parameter::Radius], &settings, &pool, &control)?;
+/// assert!(found.is_some_and(|fit| (fit.parameters[0].1[0] - 0.0104).abs() < 1e-9));
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
 /// `InvalidInput` for rows of other sizes or fewer numbers than unknowns, tendons that do not have what is fitted,

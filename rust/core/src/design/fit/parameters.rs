@@ -9,6 +9,12 @@ use crate::lie::{Pose, so3};
 use crate::robot::{Backbone, PerDisk, Robot, Routing, Tendon};
 
 /// Kind of values that a fit estimates.
+///
+/// ```
+/// use tdcr::design::Parameter;
+///
+/// assert_eq!(Parameter::ALL.map(Parameter::as_str)[5], "poisson_ratio");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Parameter {
     /// Length added to each displacement \[m\].

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::Measured;
+use super::measured::Measured;
 use super::parameters::Parameters;
 use crate::batch::Control;
 use crate::constant_curvature::{self, ConstantCurvature};

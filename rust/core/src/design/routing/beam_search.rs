@@ -105,6 +105,7 @@ pub(super) fn beam_search(
             found.truncate(width);
         }
         found.sort_by(order);
+        // They are built anew: of the others only the costs were needed.
         let next = found.iter().filter_map(|&(_, parent, choice)| {
             let mut child = nodes[parent].clone();
             let link = tables.link(i, child.choice, choice)?;

@@ -33,86 +33,11 @@ use self::task::Task;
 use crate::batch::Control;
 use crate::error::InvalidInput;
 use crate::inverse::Range;
-use crate::model::Shape;
 use crate::robot::{Path, Robot};
 use crate::rod::Plan;
-use crate::status::Status;
 
+pub use result::{Optimality, Routed};
 pub use settings::RoutingSettings;
-
-/// Knowledge about the nearest routing.
-///
-/// ```
-/// use tdcr::design::Optimality;
-///
-/// assert_eq!(Optimality::Exhaustive.as_str(), "exhaustive");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Optimality {
-    /// Every disk is in its place: nothing is nearer.
-    Reached,
-    /// Every routing was looked at over a row of tensions.
-    Exhaustive,
-    /// The best that a search met.
-    Searched,
-}
-
-impl Optimality {
-    /// The name used in Python.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Reached => "reached",
-            Self::Exhaustive => "exhaustive",
-            Self::Searched => "searched",
-        }
-    }
-}
-
-/// A robot whose tendons were routed for a shape.
-///
-/// ```
-/// use tdcr::design::{RoutingSettings, routing};
-/// use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
-///
-/// # fn main() -> Result<(), tdcr::InvalidInput> {
-/// let backbone = Backbone::new(BackboneSpec::straight(0.1, 2))?;
-/// let robot = Robot::new(backbone, vec![Tendon::straight(0.0, 0.01)?], None, None, None)?;
-/// // The rest shape is reached without any pull.
-/// let targets: Vec<_> = robot.rest_frames().iter().skip(1).map(|disk| disk.translation).collect();
-/// let settings = RoutingSettings { holes: Some(4), ..RoutingSettings::default() };
-/// let found = routing(&robot, &targets, None, None, &settings)?;
-/// assert!(found.rms < 1e-9);
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Debug)]
-pub struct Routed {
-    /// The robot with its new tendons.
-    pub robot: Robot,
-    /// Its shape under the displacements, from rest.
-    pub shape: Shape,
-    /// Displacements \[m\].
-    pub displacements: Vec<f64>,
-    /// Numbers of each tendon's holes, disk 0 to its end; none where any azimuth was allowed.
-    pub holes: Option<Vec<Vec<usize>>>,
-    /// Distance of each disk from its wanted place, disk 0 first \[m\].
-    pub errors: Vec<f64>,
-    /// Root mean square distance of disks 1 to n \[m\].
-    pub rms: f64,
-    /// Root mean square distance of the nearest routing with any azimuth that a descent from this one led to \[m\].
-    pub relaxed_rms: f64,
-    /// Knowledge about there being a nearer one.
-    pub optimality: Optimality,
-    /// Steps of descents and rounds of the search.
-    pub iterations: usize,
-    /// Equilibria of subsegments that the search solved.
-    pub evaluations: usize,
-    /// Converged: every disk is in its place; unreachable: the nearest routing that was found.
-    pub status: Status,
-    /// Message about what stood in the way, or empty.
-    pub message: String,
-}
 
 /// The holes and displacements under which the disks 1 to n of a robot are nearest to `targets` (in the world
 /// \[m\]): least sum of squared distances. Backbone, ends, stiffness and names of the tendons are the robot's, and
