@@ -43,6 +43,7 @@ __all__ = [
     "_chained_shape",
     "_displacements_from_arc",
     "_fields",
+    "_fit",
     "_forward_batch",
     "_inverse",
     "_inverse_batch",
@@ -861,6 +862,27 @@ def _arc_jacobian(
     tool: ArrayLike | None,
 ) -> _Array: ...
 def _points_on_curve(robot: Robot, points: ArrayLike, subsegment: str) -> tuple[_Array, float]: ...
+def _fit(
+    robot: Robot,
+    displacements: _Array,
+    points: _Array,
+    held_out: list[bool],
+    parameters: list[str],
+    model: str,
+    settings: RodSettings | ConstantCurvatureSettings | None,
+    robust: bool,
+    max_iterations: int,
+) -> tuple[
+    Robot,
+    dict[str, _Array],
+    dict[str, _Array],
+    _Array,
+    _Array,
+    int,
+    tuple[str, ...],
+    int,
+    bool,
+]: ...
 def _prebend(
     robot: Robot, targets: ArrayLike, displacements: ArrayLike, settings: PrebendSettings
 ) -> tuple[Robot, Shape, _Array, int, Status, str]: ...

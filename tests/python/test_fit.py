@@ -10,7 +10,6 @@ import pytest
 
 import tdcr
 from tdcr import design
-from tdcr.design.fit_problem import Measured, Problem
 
 NOISE = 2e-4
 ROWS = 60
@@ -170,43 +169,6 @@ def test_the_stiffness_of_tendons_is_found():
         design.fit(trunk(), TIPS, ["stiffness"], displacements=GIVEN)
 
 
-def test_derivatives_by_the_stiffness_of_tendons():
-    problem = Problem(elastic(), ["stiffness", "offset"], "rod", None)
-    given = np.array([[-0.004, -0.003], [-0.006, np.inf], [0.001, -0.006]])
-    measured = Measured(given, np.zeros((3, 9, 3)), np.arange(3), 0)
-    values = problem.start()
-    jacobian = problem.jacobian(values, measured)
-    for p in range(problem.size):
-        step = np.zeros(problem.size)
-        step[p] = 1e-5 / problem.scales[p]
-        behind, ahead = (problem.residuals(values + s, measured)[0] for s in (step, -step))
-        slope = (ahead - behind) / (2 * step[p])
-        assert jacobian[p] == pytest.approx(slope, rel=1e-5, abs=1e-6 * problem.scales[p]), p
-
-
-@pytest.mark.parametrize("points", [1, 9])
-def test_derivatives_are_those_of_the_predictions(points):
-    turn = np.array([[0, 0, 1, 0.1], [1, 0, 0, 0.2], [0, 1, 0, 0.3], [0, 0, 0, 1.0]])
-    tool = np.eye(4)
-    tool[:3, 3] = 0.01, 0.02, 0.03
-    rest = np.tile([0.01, 0.02, 0.005], (8, 1))
-    robot = trunk(rest=rest, base=turn, tool=tool)
-    names = ["offset", "gain", "radius", "azimuth", "poisson_ratio", "rest", "base"]
-    problem = Problem(robot, names, "rod", None)
-    given = np.array([[-0.004, -0.003], [-0.006, np.inf]])
-    measured = Measured(given, np.zeros((2, points, 3)), np.arange(2), 0)
-    values = problem.start()
-    values[-3:] = 0.3, -0.4, 0.5
-    jacobian = problem.jacobian(values, measured)
-    for p in range(problem.size):
-        step = np.zeros(problem.size)
-        step[p] = 1e-5 / problem.scales[p]
-        behind, ahead = (problem.residuals(values + s, measured)[0] for s in (step, -step))
-        slope = (ahead - behind) / (2 * step[p])
-        assert jacobian[p] == pytest.approx(slope, rel=1e-5, abs=1e-6 * problem.scales[p]), p
-
-
-@pytest.mark.slow
 def test_what_a_fit_leaves_is_judged():
     given = pulls(trunk(), 9)
     measured = noisy(positions(trunk(radii=(0.0095, 0.0112)), given))[:, -1]

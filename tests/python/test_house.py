@@ -5,7 +5,6 @@ from functools import cache
 import pytest
 from house.arrows import (
     PLANS,
-    Plan,
     arrows_against,
     circles,
     eager_imports,
@@ -119,24 +118,6 @@ def test_an_import_of_python_counts_wherever_it_stands():
 
 # --- the sources themselves --------------------------------------------------------------------
 
-# Limits that the code does not keep yet.
-PENDING = {
-    "circles rust/core/src/",
-    "comments",
-    "undocumented",
-    "files",
-    "words",
-    "participles",
-    "openings",
-    "wide",
-}
-
-
-def limits(*names):
-    """Parameters of these names, marked where they are not kept yet."""
-    pending = pytest.mark.xfail(reason="not kept yet", strict=False)
-    return [pytest.param(n, id=n, marks=[pending] if n in PENDING else []) for n in names]
-
 
 @cache
 def tree():
@@ -148,18 +129,13 @@ def parts() -> dict[str, Part]:
     return count(tree())
 
 
-def plan_of(name: str) -> Plan:
-    return next(plan for plan in PLANS if name.endswith(plan.root))
+@pytest.mark.parametrize("plan", PLANS, ids=lambda plan: plan.root)
+def test_a_room_imports_rooms_of_lower_floors_only(plan):
+    assert arrows_against(tree(), plan) == []
 
 
-@pytest.mark.parametrize("name", limits(*(f"arrows {plan.root}" for plan in PLANS)))
-def test_a_room_imports_rooms_of_lower_floors_only(name):
-    assert arrows_against(tree(), plan_of(name)) == []
-
-
-@pytest.mark.parametrize("name", limits(*(f"circles {plan.root}" for plan in PLANS)))
-def test_no_files_and_no_rooms_import_each_other_in_a_circle(name):
-    plan = plan_of(name)
+@pytest.mark.parametrize("plan", PLANS, ids=lambda plan: plan.root)
+def test_no_files_and_no_rooms_import_each_other_in_a_circle(plan):
     arrows = file_arrows(tree(), plan.root)
     # A list of what there is looks at all of it and is looked at for what all share.
     assert circles({(a, b) for a, b in arrows if not a.endswith("src/lib.rs")}) == []
@@ -170,8 +146,7 @@ def test_pictures_are_imported_by_the_call_that_draws():
     assert eager_imports(tree()) == []
 
 
-@pytest.mark.parametrize("name", limits("comments"))
-def test_long_functions_of_the_core_are_commented(name):
+def test_long_functions_of_the_core_are_commented():
     assert parts()["core"].density >= 8
 
 
@@ -180,34 +155,28 @@ def over(what):
     return [place for part in parts().values() for place in getattr(part, what)]
 
 
-@pytest.mark.parametrize("name", limits("undocumented"))
-def test_functions_over_60_lines_have_docstrings(name):
+def test_functions_over_60_lines_have_docstrings():
     assert over("undocumented") == []
 
 
-@pytest.mark.parametrize("name", limits("files"))
-def test_files_end_by_line_400_but_the_stub(name):
+def test_files_end_by_line_400_but_the_stub():
     found = over("long_files")
     assert [place for place in found if not place.startswith("python/tdcr/_core.pyi")] == []
 
 
-@pytest.mark.parametrize("name", limits("words"))
-def test_names_are_those_of_the_field(name):
+def test_names_are_those_of_the_field():
     assert over("old_words") == []
 
 
-@pytest.mark.parametrize("name", limits("participles"))
-def test_functions_are_verbs_or_nouns(name):
+def test_functions_are_verbs_or_nouns():
     found = over("participles")
     assert len(found) < 40, found
 
 
-@pytest.mark.parametrize("name", limits("openings"))
-def test_docs_open_with_the_noun_that_a_reader_searches_for(name):
+def test_docs_open_with_the_noun_that_a_reader_searches_for():
     found = over("openings")
     assert len(found) < 40, found
 
 
-@pytest.mark.parametrize("name", limits("wide"))
-def test_prose_ends_by_column_120(name):
+def test_prose_ends_by_column_120():
     assert over("wide") == []

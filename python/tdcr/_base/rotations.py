@@ -1,4 +1,4 @@
-"""Rotation vectors: their matrices, and the angular velocities of their entries."""
+"""Rotation vectors: their matrices."""
 
 from __future__ import annotations
 
@@ -11,28 +11,13 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["rotation", "spins"]
-
-
-def _cross(vector: Array) -> tuple[float, Array]:
-    """Length of a vector, and the matrix of its cross product."""
-    x, y, z = vector
-    return float(np.linalg.norm(vector)), np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def spins(vector: Array) -> Array:
-    """Rows: angular velocity by each entry of a rotation vector, the left Jacobian's columns."""
-    angle, cross = _cross(vector)
-    second = 0.5 * np.sinc(angle / 2 / np.pi) ** 2
-    # (a - sin(a))/a^3, by its series where that cancels.
-    third = (angle - np.sin(angle)) / angle**3 if angle > 1e-2 else 1 / 6 - angle**2 / 120
-    spins: Array = (np.eye(3) + second * cross + third * cross @ cross).T
-    return spins
+__all__ = ["rotation"]
 
 
 def rotation(vector: Array) -> Array:
     """Rotation matrix of a rotation vector [rad], by Rodrigues' formula."""
-    angle, cross = _cross(vector)
+    x, y, z = vector
+    angle, cross = np.linalg.norm(vector), np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     # sin(a)/a and (1 - cos(a))/a^2, the latter by half angles.
     first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / 2 / np.pi) ** 2
     turned: Array = np.eye(3) + first * cross + second * cross @ cross

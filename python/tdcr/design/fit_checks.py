@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from tdcr._core import Robot
-from tdcr.design.fit_problem import NAMES, PER_TENDON, Measured, Problem
+from tdcr.design.fit_problem import NAMES, PER_TENDON, Measured
 from tdcr.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Array: TypeAlias = NDArray[np.float64]
 
-__all__ = ["check_problem", "far_off", "unsolved", "whole"]
+__all__ = ["at_bounds", "check_problem", "far_off", "unsolved", "whole"]
 
 # Root mean square distances from which a fit is no description of what was measured: as a share of
 # the robot's length (calibrated models of a measured one leave 2 to 4 %), and in medians (normal
@@ -58,6 +58,11 @@ def far_off(distances: Array, length: float) -> list[str]:
     return []
 
 
+def at_bounds(names: Sequence[str]) -> list[str]:
+    """Say which values are as small or as great as a robot can have."""
+    return [f"at the least or greatest that a robot can have: {', '.join(names)}"] * bool(names)
+
+
 def unsolved(failed: int, rows: int) -> list[str]:
     """Say how many rows count with a shape that is not one of the robot's."""
     if not failed:
@@ -71,9 +76,8 @@ def check_problem(
     measurements: ArrayLike,
     parameters: Sequence[str],
     model: str,
-    settings: Any,
     validation: float,
-) -> tuple[Problem, Measured]:
+) -> tuple[list[str], Measured]:
     """Check what a fit is given, but for its counts."""
     # Robot, model, share that is held out.
     if not isinstance(robot, Robot):
@@ -114,6 +118,4 @@ def check_problem(
         if tendon.stiffness is None and "stiffness" in names:
             message = "parameters: expected tendons with a stiffness [N] to fit it"
             raise InvalidInput(f"{message}, got tendons[{k}] without one", "parameters")
-    return Problem(robot, names, model, settings), Measured.checked(
-        robot, displacements, measurements
-    )
+    return names, Measured.checked(robot, displacements, measurements)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
+from tdcr import _core
 from tdcr._base.status import Status
 from tdcr._base.value import Value
-from tdcr._core import Robot
 from tdcr._io.save_load import Saved
-from tdcr.design.fit_checks import check_problem, far_off, unsolved, whole
+from tdcr.design.fit_checks import at_bounds, check_problem, far_off, unsolved, whole
 from tdcr.design.measurements import Measurements
 from tdcr.errors import InvalidInput, NotConverged
 
@@ -20,17 +20,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tdcr._core import ConstantCurvatureSettings, Robot, RodSettings
-    from tdcr.design.fit_problem import Measured, Problem
 
     Array: TypeAlias = NDArray[np.float64]
     Part: TypeAlias = Literal["train", "validation"]
 
 __all__ = ["Fit", "fit"]
-
-# Relative fall of the cost, and relative step, below which a round has converged.
-_FALL, _STEP = 1e-7, 1e-8
-# Directions whose curvature is below this share of the largest are not told by the data.
-_BLIND = 1e-12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -176,8 +170,7 @@ def fit(
 
     Levenberg-Marquardt steps on the distances between measured and predicted points: first least
     squares, then, if `robust`, the soft-L1 loss with twice the median distance as its scale.
-    Derivatives are exact for the rod and the base (`sensitivity`), and central differences of the
-    constant-curvature model.
+    Derivatives are exact, and one forward solve of a row gives them with its points.
 
     Parameters
     ----------
@@ -220,8 +213,8 @@ def fit(
     """
     # Arguments.
     displacements, measurements = _pair(displacements, measurements)
-    problem, measured = check_problem(
-        robot, displacements, measurements, parameters, model, settings, validation
+    names, measured = check_problem(
+        robot, displacements, measurements, parameters, model, validation
     )
     if not isinstance(robust, bool):
         raise TypeError(f"robust: expected a bool, got {type(robust).__name__}")
@@ -232,47 +225,29 @@ def fit(
     held = np.zeros(count, dtype=bool)
     order = np.random.default_rng(seed).permutation(count)
     held[order[: round(validation * count)]] = True
-    train = measured.only(~held)
-    if train.points.size <= problem.size:
-        raise InvalidInput(
-            f"measurements: expected more numbers to fit to than unknowns ({problem.size}), "
-            f"got {train.points.size}",
-            "measurements",
-        )
-    # Least squares, then the soft-L1 loss.
-    values = problem.start()
-    before, _ = problem.residuals(values, measured)
-    values, iterations, done = _descend(problem, train, values, np.inf, max_iterations)
-    scale = np.inf
-    if robust and done:
-        distances = np.linalg.norm(problem.residuals(values, train)[0], axis=2)
-        # Data without noise have no outliers either.
-        scale = max(2 * float(np.median(distances)), 1e-9 * robot.backbone.total_length)
-        rest = max_iterations - iterations
-        values, more, done = _descend(problem, train, values, scale, rest)
-        iterations += more
-    # Standard errors, and what speaks against the fit.
-    errors = _standard_errors(problem, train, values, scale)
-    after, solved = problem.residuals(values, measured)
-    status = Status.converged if done else Status.iteration_limit
+    # Least squares, then the soft-L1 loss, and standard errors.
+    points = measured.displacements, measured.points, held.tolist()
+    fitted, values, errors, after, before, failed, bound, iterations, done = _core._fit(
+        robot, *points, names, model, settings, robust, max_iterations
+    )
+    # What speaks against the fit.
     parts = [] if done else [f"still falling after {iterations} iterations"]
-    failed = int(np.count_nonzero(~solved))
-    parts += problem.at_bounds(values)
+    parts += at_bounds(bound)
     parts += unsolved(failed, count)
     parts += far_off(np.linalg.norm(after[~held], axis=2), robot.backbone.total_length)
-    for array in (after, before, measured.rows, held):
+    for array in (measured.rows, held):
         array.flags.writeable = False
     return Fit(
-        robot=problem.robot(values),
-        parameters=problem.named(values),
-        standard_errors=problem.named(errors),
+        robot=fitted,
+        parameters=values,
+        standard_errors=errors,
         residuals=after,
         residuals_before=before,
         rows=measured.rows,
         validation=held,
         dropped=measured.dropped,
         failed=failed,
-        status=status,
+        status=Status.converged if done else Status.iteration_limit,
         message="; ".join(parts),
         iterations=iterations,
         seed=seed,
@@ -291,75 +266,3 @@ def _pair(
     if displacements is None:
         raise TypeError("displacements: expected an array, or Measurements as measurements")
     return displacements, measurements
-
-
-def _weights(residuals: Array, solved: NDArray[np.bool_], scale: float) -> tuple[Array, float]:
-    """Weights of the points (rows, points) and cost, of the soft-L1 loss."""
-    squares: Array = (residuals**2).sum(axis=2)
-    if np.isinf(scale):
-        weights: Array = np.repeat(solved[:, None], squares.shape[1], axis=1).astype(np.float64)
-        return weights, float(squares.sum())
-    root: Array = np.sqrt(1 + squares / scale**2)
-    weights = solved[:, None] / root
-    return weights, float((2 * scale**2 * (root - 1)).sum())
-
-
-def _descend(
-    problem: Problem, measured: Measured, values: Array, scale: float, budget: int
-) -> tuple[Array, int, bool]:
-    """Levenberg-Marquardt steps: values, steps taken, whether they converged."""
-    damping = 1e-4
-    residuals, solved = problem.residuals(values, measured)
-    weights, cost = _weights(residuals, solved, scale)
-    for iteration in range(budget):
-        jacobian = problem.jacobian(values, measured) / problem.scales[:, None, None, None]
-        weighted = jacobian * weights[:, :, None]
-        gram = np.einsum("aijk,bijk->ab", weighted, jacobian, optimize=True)
-        slope = np.einsum("aijk,ijk->a", weighted, residuals)
-        while True:
-            damped = gram + damping * np.diag(np.maximum(np.diag(gram), 1e-300))
-            step = np.linalg.lstsq(damped, slope, rcond=1e-14)[0]
-            small = np.abs(step).max() <= _STEP
-            moved = problem.bounded(values + step / problem.scales)
-            trial, trial_solved = problem.residuals(moved, measured)
-            trial_weights, trial_cost = _weights(trial, trial_solved, scale)
-            if trial_cost < cost:
-                break
-            damping *= 10
-            if small or damping > 1e10:
-                return values, iteration + 1, True
-        fall = (cost - trial_cost) / max(cost, 1e-300)
-        values, residuals, weights, cost = moved, trial, trial_weights, trial_cost
-        damping = max(damping / 10, 1e-12)
-        if fall < _FALL or small:
-            return values, iteration + 1, True
-    return values, budget, False
-
-
-def _standard_errors(problem: Problem, measured: Measured, values: Array, scale: float) -> Array:
-    """Root of the sandwich estimate's diagonal; rows are independent, points of a row are not.
-
-    Every row's residual is that of a fit without it, by its leverage: HC3 of MacKinnon & White
-    (1985), which holds for few rows too.
-    """
-    residuals, solved = problem.residuals(values, measured)
-    weights, _ = _weights(residuals, solved, scale)
-    count, numbers = len(residuals), residuals[0].size
-    jacobian = problem.jacobian(values, measured) / problem.scales[:, None, None, None]
-    # The loss is flatter along a residual than its weight says: its second derivative is
-    # w - w^3 r r^T / s^2.
-    along = np.einsum("aijk,ijk->aij", jacobian, residuals)
-    flatter = np.einsum("aij,ij,bij->ab", along, weights**3 / scale**2, along, optimize=True)
-    weighted = (jacobian * weights[:, :, None]).reshape(-1, count, numbers)
-    jacobian = jacobian.reshape(-1, count, numbers)
-    gram = np.einsum("aim,bim->ab", weighted, jacobian, optimize=True) - flatter
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    curvature, axes = np.linalg.eigh(gram / size / size[:, None])
-    seen = curvature > _BLIND * curvature[-1]
-    inverse = (axes[:, seen] / curvature[seen]) @ axes[:, seen].T / size / size[:, None]
-    leverage = np.einsum("aim,ab,bik->imk", jacobian, inverse, weighted, optimize=True)
-    without = np.linalg.pinv(np.eye(numbers) - leverage) @ residuals.reshape(count, numbers, 1)
-    scores = np.einsum("aim,im->ai", weighted, without[:, :, 0])
-    errors = np.sqrt(np.diag(inverse @ (scores @ scores.T) @ inverse))
-    blind = (np.abs(axes[:, ~seen]) > 1e-4).any(axis=1) | (np.diag(gram) == 0)
-    return np.where(blind, np.inf, errors / problem.scales)

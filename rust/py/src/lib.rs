@@ -28,6 +28,8 @@ mod _core {
         _arc_frames, _arc_from_displacements, _arc_jacobian, _displacements_from_arc,
     };
     #[pymodule_export]
+    use crate::design::fit::_fit;
+    #[pymodule_export]
     use crate::design::prebend::{_points_on_curve, _prebend};
     #[pymodule_export]
     use crate::design::routing::{_routing, _routing_batch};

@@ -6,4 +6,5 @@ mod rows;
 
 pub use field::{Field, Key};
 pub use pool::pool;
+pub(crate) use rows::in_row;
 pub use rows::{Column, Control, Solved, chain_rows, chained_shape, solve_rows};

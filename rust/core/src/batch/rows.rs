@@ -343,6 +343,6 @@ fn write_points(place: &mut [f64], points: impl Iterator<Item = Vector3<f64>>) {
 }
 
 /// Error with its row.
-fn in_row(error: InvalidInput, row: usize) -> InvalidInput {
+pub(crate) fn in_row(error: InvalidInput, row: usize) -> InvalidInput {
     InvalidInput { got: format!("{} in row {row}", error.got), ..error }
 }

@@ -33,12 +33,12 @@ use crate::status::Status;
 pub struct Scratch {
     state: State,
     /// The arc of every segment.
-    arcs: Vec<Arc>,
+    pub(super) arcs: Vec<Arc>,
     /// Displacement given minus displacement of the arcs, per tendon; 0 where it does not count.
     misfit: Vec<f64>,
-    active: Vec<bool>,
+    pub(super) active: Vec<bool>,
     /// The inverse for the last pattern of counted tendons that was not "all".
-    masked: Option<MaskedInverse>,
+    pub(super) masked: Option<MaskedInverse>,
 }
 
 impl Scratch {
@@ -70,8 +70,8 @@ impl Scratch {
 /// ```
 #[derive(Clone, Debug)]
 pub struct ConstantCurvature<'r> {
-    robot: &'r Robot,
-    plan: &'r Plan,
+    pub(super) robot: &'r Robot,
+    pub(super) plan: &'r Plan,
 }
 
 /// Share of a tendon's length by which displacements may miss the arcs without being called

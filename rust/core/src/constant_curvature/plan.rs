@@ -28,6 +28,14 @@ impl Coupling {
     /// Both, in the order of their discriminants.
     pub const ALL: [Self; 2] = [Self::Coupled, Self::PerSegment];
 
+    /// Whether a tendon's displacement knows of a segment.
+    pub(super) const fn joins(self, end: usize, segment: &Segment) -> bool {
+        match self {
+            Self::Coupled => end >= segment.last,
+            Self::PerSegment => end == segment.last,
+        }
+    }
+
     /// The name used in Python.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
@@ -111,7 +119,7 @@ pub struct Plan {
     /// Mean radius of all tendons: the scale that makes bending and elongation comparable.
     pub(super) scale: f64,
     /// Displacements over unknowns, all tendons.
-    matrix: DMatrix<f64>,
+    pub(super) matrix: DMatrix<f64>,
     /// Its inverse when every tendon counts.
     inverse: PseudoInverse,
     unactuated_directions: Vec<DVector<f64>>,
@@ -145,11 +153,7 @@ impl Plan {
         let mut matrix = DMatrix::zeros(paths.len(), width * segments.len());
         for (k, path) in paths.iter().enumerate() {
             for (i, segment) in segments.iter().enumerate() {
-                let through = match settings.coupling {
-                    Coupling::Coupled => path.end() >= segment.last,
-                    Coupling::PerSegment => path.end() == segment.last,
-                };
-                if through {
+                if settings.coupling.joins(path.end(), segment) {
                     matrix[(k, width * i)] = -path.holes[0].x / scale;
                     matrix[(k, width * i + 1)] = -path.holes[0].y / scale;
                     if settings.extensible {

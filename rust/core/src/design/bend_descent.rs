@@ -11,7 +11,7 @@ const DAMPING: f64 = 1e-6;
 const STIFF: f64 = 1e9;
 
 /// Least squares in the bends of subsegments.
-pub(super) trait Bent {
+pub(super) trait BendProblem {
     /// Share of the sum of squares that a step must take off to be followed by another.
     const HEADWAY: f64;
     /// Bends and all that was found out at them.
@@ -19,21 +19,21 @@ pub(super) trait Bent {
     /// Rotation vectors \[rad\], whose z the descent keeps.
     fn bends<'a>(&self, point: &'a Self::Point) -> &'a [Vector3<f64>];
     fn residual<'a>(&self, point: &'a Self::Point) -> &'a DVector<f64>;
-    /// Of the residual, by bends about x and y, subsegment by subsegment.
+    /// Derivatives of the residual by bends about x and y, subsegment by subsegment.
     fn jacobian(&self, point: &Self::Point) -> Result<DMatrix<f64>, InvalidInput>;
-    /// At other bends, near a point; none where there is no answer.
+    /// Point at other bends, near another; none where there is no answer.
     fn at(
         &self,
         bends: Vec<Vector3<f64>>,
         near: &Self::Point,
     ) -> Result<Option<Self::Point>, InvalidInput>;
-    /// Whether a point is good enough.
-    fn met(&self, point: &Self::Point) -> bool;
-    fn stopped(&self) -> bool;
+    /// Decision that a point is good enough.
+    fn is_met(&self, point: &Self::Point) -> bool;
+    fn is_stopped(&self) -> bool;
 }
 
 /// A rotation vector whose bend is within a bound.
-pub(super) fn within(bend: &Vector3<f64>, most: f64) -> Vector3<f64> {
+pub(super) fn clamp_bend(bend: &Vector3<f64>, most: f64) -> Vector3<f64> {
     let size = bend.xy().norm();
     let share = if size > most { most / size } else { 1.0 };
     // A rest strain of more than half a turn does not exist.
@@ -42,8 +42,8 @@ pub(super) fn within(bend: &Vector3<f64>, most: f64) -> Vector3<f64> {
     out * ((1.0 - 1e-15) * PI / out.norm()).min(1.0)
 }
 
-/// Where Levenberg-Marquardt steps lead with bends of at most `most`, and how many they were.
-pub(super) fn descend<P: Bent>(
+/// End of Levenberg-Marquardt steps with bends of at most `most`, and their number.
+pub(super) fn descend<P: BendProblem>(
     problem: &P,
     start: P::Point,
     most: f64,
@@ -52,11 +52,11 @@ pub(super) fn descend<P: Bent>(
     let mut best = start;
     let mut damping = DAMPING;
     for step in 0..steps {
-        if problem.stopped() || problem.met(&best) {
+        if problem.is_stopped() || problem.is_met(&best) {
             return Ok((best, step));
         }
         let value = problem.residual(&best).norm_squared();
-        let Some(next) = lower(problem, &best, most, &mut damping)? else {
+        let Some(next) = descent_step(problem, &best, most, &mut damping)? else {
             return Ok((best, step));
         };
         let headway = 1.0 - problem.residual(&next).norm_squared() / value;
@@ -69,8 +69,8 @@ pub(super) fn descend<P: Bent>(
     Ok((best, steps))
 }
 
-/// A lower point: less damped steps first.
-fn lower<P: Bent>(
+/// Levenberg-Marquardt step to a lower point: less damped ones first.
+fn descent_step<P: BendProblem>(
     problem: &P,
     from: &P::Point,
     most: f64,
@@ -80,9 +80,9 @@ fn lower<P: Bent>(
     let value = residual.norm_squared();
     let mut jacobian = problem.jacobian(from)?;
     let mut gradient = jacobian.tr_mul(residual);
-    hold(problem.bends(from), most, &mut jacobian, &mut gradient);
+    project_at_bound(problem.bends(from), most, &mut jacobian, &mut gradient);
     let gram = jacobian.tr_mul(&jacobian);
-    while *damping < STIFF && !problem.stopped() {
+    while *damping < STIFF && !problem.is_stopped() {
         let mut damped = gram.clone();
         for k in 0..damped.nrows() {
             damped[(k, k)] += *damping * (1e-12 + value);
@@ -93,7 +93,7 @@ fn lower<P: Bent>(
         };
         let step = factor.solve(&gradient);
         let bends = problem.bends(from).iter().enumerate().map(|(i, bend)| {
-            within(&(bend - Vector3::new(step[2 * i], step[2 * i + 1], 0.0)), most)
+            clamp_bend(&(bend - Vector3::new(step[2 * i], step[2 * i + 1], 0.0)), most)
         });
         let next = problem.at(bends.collect(), from)?;
         if let Some(next) = next.filter(|p| problem.residual(p).norm_squared() < value) {
@@ -104,8 +104,9 @@ fn lower<P: Bent>(
     Ok(None)
 }
 
-/// Takes the way out of the bound from subsegments that are at it and would leave it; they can still turn.
-fn hold(
+/// Projection of gradient and Jacobian onto the bound of bends, for subsegments that are at it and would leave it:
+/// they can still turn.
+fn project_at_bound(
     bends: &[Vector3<f64>],
     most: f64,
     jacobian: &mut DMatrix<f64>,

@@ -4,13 +4,13 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::Vector3;
 
-use super::points_on_curve::{mirrored, piece_length};
+use super::points_on_curve::{mirror_tangent, piece_length};
 use crate::robot::Robot;
 use crate::rod::Subsegment;
 
 /// The first subsegment whose ends the places do not give it, by more than a share `off` of its length, as the
 /// end of a message; empty if there is none.
-pub(super) fn hindrance(
+pub(super) fn infeasible_chord(
     robot: &Robot,
     targets: &[Vector3<f64>],
     kind: Subsegment,
@@ -40,7 +40,7 @@ pub(super) fn hindrance(
                  {shape} of {piece:.6} m; the subsegment has {length:.6} m"
             );
         }
-        tangent = mirrored(&tangent, &chord);
+        tangent = mirror_tangent(&tangent, &chord);
         place = *target;
     }
     String::new()

@@ -2,6 +2,7 @@
 
 mod bend_descent;
 mod feasibility;
+mod fit;
 mod nearest_rod;
 mod points_on_curve;
 mod prebend;
@@ -9,6 +10,7 @@ mod routing;
 mod settings;
 mod stepwise_tensions;
 
+pub use fit::{Fit, FitSettings, Measured, Parameter, fit};
 pub use points_on_curve::{angle_at_base, points_on_curve};
 pub use prebend::{Prebend, prebend, prebend_stopped_by};
 pub use routing::{Optimality, Routed, RoutingSettings, routing, routing_rows, routing_stopped_by};

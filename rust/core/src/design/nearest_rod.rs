@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::bend_descent::{Bent, descend, within};
+use super::bend_descent::{BendProblem, clamp_bend, descend};
 use crate::error::InvalidInput;
 use crate::lie::Pose;
 use crate::robot::Robot;
@@ -25,7 +25,7 @@ const DIRECTIONS: usize = 8;
 
 /// A rod's bends, and where they take its disks.
 #[derive(Clone, Debug)]
-pub(super) struct Way {
+pub(super) struct NearestRod {
     pub(super) bends: Vec<Vector3<f64>>,
     /// Disks 1 to n \[m\].
     pub(super) places: Vec<Vector3<f64>>,
@@ -34,7 +34,7 @@ pub(super) struct Way {
 }
 
 /// Subsegments that bend as they like, with the twists they have.
-pub(super) struct Chain<'a> {
+pub(super) struct NearestRodProblem<'a> {
     pub(super) robot: &'a Robot,
     pub(super) targets: &'a [Vector3<f64>],
     pub(super) kind: Subsegment,
@@ -45,7 +45,7 @@ pub(super) struct Chain<'a> {
 }
 
 /// Bends, and the chain that they make.
-pub(super) struct Placed {
+pub(super) struct BentRod {
     bends: Vec<Vector3<f64>>,
     /// Frames of disks 0 to n.
     frames: Vec<Pose>,
@@ -53,20 +53,20 @@ pub(super) struct Placed {
     residual: DVector<f64>,
 }
 
-impl Bent for Chain<'_> {
+impl BendProblem for NearestRodProblem<'_> {
     const HEADWAY: f64 = 1e-8;
 
-    type Point = Placed;
+    type Point = BentRod;
 
-    fn bends<'a>(&self, point: &'a Placed) -> &'a [Vector3<f64>] {
+    fn bends<'a>(&self, point: &'a BentRod) -> &'a [Vector3<f64>] {
         &point.bends
     }
 
-    fn residual<'a>(&self, point: &'a Placed) -> &'a DVector<f64> {
+    fn residual<'a>(&self, point: &'a BentRod) -> &'a DVector<f64> {
         &point.residual
     }
 
-    fn jacobian(&self, point: &Placed) -> Result<DMatrix<f64>, InvalidInput> {
+    fn jacobian(&self, point: &BentRod) -> Result<DMatrix<f64>, InvalidInput> {
         let n = self.targets.len();
         let per_length = 1.0 / self.robot.backbone().total_length();
         let mut out = DMatrix::zeros(3 * n, 2 * n);
@@ -84,39 +84,39 @@ impl Bent for Chain<'_> {
         Ok(out)
     }
 
-    fn at(&self, bends: Vec<Vector3<f64>>, _: &Placed) -> Result<Option<Placed>, InvalidInput> {
-        Ok(Some(self.placed(bends)))
+    fn at(&self, bends: Vec<Vector3<f64>>, _: &BentRod) -> Result<Option<BentRod>, InvalidInput> {
+        Ok(Some(self.bend_rod(bends)))
     }
 
-    fn met(&self, point: &Placed) -> bool {
+    fn is_met(&self, point: &BentRod) -> bool {
         point.residual.amax() < 1e-15
     }
 
-    fn stopped(&self) -> bool {
+    fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 }
 
-impl Chain<'_> {
+impl NearestRodProblem<'_> {
     /// The minima that were found, the nearest first.
-    pub(super) fn ways(&self, own: &[Vector3<f64>]) -> Result<Vec<Way>, InvalidInput> {
+    pub(super) fn minima(&self, own: &[Vector3<f64>]) -> Result<Vec<NearestRod>, InvalidInput> {
         let mut found = Vec::new();
         for start in self.starts(own) {
-            found.push(descend(self, self.placed(start), self.most, FIRST)?.0);
+            found.push(descend(self, self.bend_rod(start), self.most, FIRST)?.0);
         }
         let mut minima = Vec::new();
         for point in self.distinct(found) {
             minima.push(descend(self, point, self.most, STEPS)?.0);
         }
-        let way = |point: Placed| Way {
+        let nearest = |point: BentRod| NearestRod {
             cost: cost(&point),
             places: point.frames.iter().skip(1).map(|frame| frame.translation).collect(),
             bends: point.bends,
         };
-        Ok(self.distinct(minima).into_iter().map(way).collect())
+        Ok(self.distinct(minima).into_iter().map(nearest).collect())
     }
 
-    fn placed(&self, bends: Vec<Vector3<f64>>) -> Placed {
+    fn bend_rod(&self, bends: Vec<Vector3<f64>>) -> BentRod {
         let lengths = self.robot.backbone().lengths();
         let mut frames = vec![*self.robot.base()];
         let mut elements = Vec::with_capacity(bends.len());
@@ -131,7 +131,7 @@ impl Chain<'_> {
             [off.x, off.y, off.z]
         });
         let residual = DVector::from_vec(off.collect());
-        Placed { bends, frames, elements, residual }
+        BentRod { bends, frames, elements, residual }
     }
 
     /// Bends to start from: pursuits of the places and of the steps between them, straight, the robot's own,
@@ -157,7 +157,7 @@ impl Chain<'_> {
                 bend.x += 0.02 * phase.sin();
                 bend.y += 0.02 * (1.7 * phase).cos();
                 bend.z = self.twists[i];
-                *bend = within(bend, self.most);
+                *bend = clamp_bend(bend, self.most);
             }
         }
         out
@@ -184,12 +184,12 @@ impl Chain<'_> {
 
     /// The nearest whose disks are in different places, nearest first: of mirror images, which come as near, the
     /// tendons may reach but one.
-    fn distinct(&self, mut points: Vec<Placed>) -> Vec<Placed> {
+    fn distinct(&self, mut points: Vec<BentRod>) -> Vec<BentRod> {
         points.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
         let within = ALIKE * self.robot.backbone().total_length();
-        let mut kept: Vec<Placed> = Vec::new();
+        let mut kept: Vec<BentRod> = Vec::new();
         for point in points {
-            let same = |other: &Placed| {
+            let same = |other: &BentRod| {
                 let mut pairs = point.frames.iter().zip(&other.frames);
                 pairs.all(|(a, b)| (a.translation - b.translation).amax() <= within)
             };
@@ -201,6 +201,6 @@ impl Chain<'_> {
     }
 }
 
-fn cost(point: &Placed) -> f64 {
+fn cost(point: &BentRod) -> f64 {
     point.residual.norm_squared()
 }

@@ -26,7 +26,7 @@ pub(super) fn piece_length(kind: Subsegment, tangent: &Vector3<f64>, chord: &Vec
 }
 
 /// The tangent at an arc's end: the one at its start, mirrored at the chord.
-pub(super) fn mirrored(tangent: &Vector3<f64>, chord: &Vector3<f64>) -> Vector3<f64> {
+pub(super) fn mirror_tangent(tangent: &Vector3<f64>, chord: &Vector3<f64>) -> Vector3<f64> {
     let axis = tangent.cross(chord);
     let half = axis.norm().atan2(tangent.dot(chord));
     if axis.norm() > 0.0 {
@@ -66,6 +66,7 @@ pub fn points_on_curve(
         let got = format!("one that leaves {:.1} deg off it", angle.to_degrees());
         return Err(InvalidInput::new("points", expected, got));
     }
+    // The curve moved to the base, one subsegment after the other.
     let base: &Pose = robot.base();
     let shift = base.translation - points[0];
     let mut tangent = base.rotation.column(2).into_owned();
@@ -81,6 +82,7 @@ pub fn points_on_curve(
             let got = format!("one of {:.6} m", spline.length());
             return Err(InvalidInput::new("points", expected, got));
         }
+        // Bisection for the arc length at which the piece has the subsegment's length.
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
             if needed(middle) < *length { low = middle } else { high = middle }
@@ -88,7 +90,7 @@ pub fn points_on_curve(
         at = 0.5 * (low + high);
         let next = spline.at_arc_length(at).0 + shift;
         if kind == Subsegment::Arc {
-            tangent = mirrored(&tangent, &(next - place));
+            tangent = mirror_tangent(&tangent, &(next - place));
         }
         place = next;
         out.push(next);

@@ -8,12 +8,12 @@ use std::sync::atomic::{AtomicBool, Ordering as Memory};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::bend_descent::{Bent, descend, within};
+use super::bend_descent::{BendProblem, clamp_bend, descend};
 use super::check_targets;
-use super::feasibility::hindrance;
-use super::nearest_rod::Chain;
+use super::feasibility::infeasible_chord;
+use super::nearest_rod::NearestRodProblem;
 use super::settings::PrebendSettings;
-use super::stepwise_tensions::march;
+use super::stepwise_tensions::solve_tensions;
 use crate::error::InvalidInput;
 use crate::model::Model;
 use crate::model::Shape;
@@ -60,7 +60,7 @@ pub struct Prebend {
     pub iterations: usize,
     /// Converged, or unreachable: then the robot is the nearest found.
     pub status: Status,
-    /// What stood in the way, or empty.
+    /// Message about what stood in the way, or empty.
     pub message: String,
 }
 
@@ -83,7 +83,7 @@ pub fn prebend(
     prebend_stopped_by(robot, targets, displacements, settings, &Arc::default())
 }
 
-/// The same, which ends soon after the flag is set, with the status of an iteration limit.
+/// [`prebend`] that ends soon after the flag is set, with the status of an iteration limit.
 ///
 /// # Errors
 /// As [`prebend`].
@@ -99,20 +99,20 @@ pub fn prebend_stopped_by(
     check_targets(robot, targets)?;
     let design = Design { robot, targets, displacements, settings, stop };
     let own = design.own_rest();
-    let start = match design.marched(targets)? {
+    let start = match design.invert_stepwise(targets)? {
         Some(candidate) => candidate,
-        None => design.solved(own.clone(), None, 0)?,
+        None => design.solve(own.clone(), None, 0)?,
     };
-    let there = design.reached(&start);
+    let there = design.reaches(&start);
     if there && settings.smoothness == 0.0 {
-        return Ok(design.told(start, None));
+        return Ok(design.outcome(start, None));
     }
-    let first = design.pulled(design.refined(start)?)?;
-    if there || design.reached(&first) || design.stopped() {
-        return Ok(design.told(first, None));
+    let first = design.solve_from_rest(design.refine(start)?)?;
+    if there || design.reaches(&first) || design.is_stopped() {
+        return Ok(design.outcome(first, None));
     }
-    let (best, reach) = design.sought(first, &own)?;
-    Ok(design.told(best, Some(reach)))
+    let (best, reach) = design.search(first, &own)?;
+    Ok(design.outcome(best, Some(reach)))
 }
 
 struct Design<'a> {
@@ -149,7 +149,7 @@ impl Design<'_> {
     }
 
     /// The forward solve of a rest shape: near an earlier one, or from rest.
-    fn solved(
+    fn solve(
         &self,
         rest: Vec<Vector3<f64>>,
         near: Option<&Shape>,
@@ -168,8 +168,8 @@ impl Design<'_> {
         Ok(Candidate { robot, rest, shape, residual, iterations, cold: near.is_none() })
     }
 
-    /// By marching along places.
-    fn marched(&self, places: &[Vector3<f64>]) -> Result<Option<Candidate>, InvalidInput> {
+    /// Rest shape by inversion of one subsegment after the other along places.
+    fn invert_stepwise(&self, places: &[Vector3<f64>]) -> Result<Option<Candidate>, InvalidInput> {
         let rod = RodSettings {
             elements: 1,
             axial: false,
@@ -178,11 +178,11 @@ impl Design<'_> {
         };
         let plan = Plan::new(self.robot, rod)?;
         let twists: Vec<f64> = self.own_rest().iter().map(|rest| rest.z).collect();
-        let found = march(&plan, self.robot.base(), places, &twists, self.displacements);
+        let found = solve_tensions(&plan, self.robot.base(), places, &twists, self.displacements);
         let Some(answer) = found else { return Ok(None) };
         let most = self.settings.max_bend;
-        let rest = answer.march.rest.iter().map(|rest| within(rest, most)).collect();
-        self.solved(rest, None, answer.iterations).map(Some)
+        let rest = answer.march.rest.iter().map(|rest| clamp_bend(rest, most)).collect();
+        self.solve(rest, None, answer.iterations).map(Some)
     }
 
     fn errors(&self, shape: &Shape) -> Vec<f64> {
@@ -195,8 +195,8 @@ impl Design<'_> {
         self.robot.backbone().total_length()
     }
 
-    /// Whether every disk is in its place.
-    fn reached(&self, candidate: &Candidate) -> bool {
+    /// Decision that every disk is in its place.
+    fn reaches(&self, candidate: &Candidate) -> bool {
         let worst = self.errors(&candidate.shape).into_iter().fold(0.0_f64, f64::max);
         let converged = candidate.shape.report.status == Status::Converged;
         converged && worst <= self.settings.tolerance * self.length()
@@ -215,8 +215,8 @@ impl Design<'_> {
         DVector::from_vec(off.chain(smooth).collect())
     }
 
-    /// Where a descent leads from a rest shape that follows the displacements.
-    fn refined(&self, start: Candidate) -> Result<Candidate, InvalidInput> {
+    /// Descent from a rest shape that follows the displacements.
+    fn refine(&self, start: Candidate) -> Result<Candidate, InvalidInput> {
         if start.shape.report.status != Status::Converged {
             return Ok(start);
         }
@@ -225,53 +225,58 @@ impl Design<'_> {
     }
 
     /// The shape of a rest shape when it is pulled from there.
-    fn pulled(&self, candidate: Candidate) -> Result<Candidate, InvalidInput> {
+    fn solve_from_rest(&self, candidate: Candidate) -> Result<Candidate, InvalidInput> {
         if candidate.cold {
             return Ok(candidate);
         }
-        self.solved(candidate.rest, None, candidate.iterations)
+        self.solve(candidate.rest, None, candidate.iterations)
     }
 
-    /// The best of descents from where rods of these lengths come nearest, whatever bends them, and root mean
-    /// square of the distances that they leave \[m\].
-    fn sought(
+    /// Best descent from the nearest rods of these lengths, whatever bends them, and root mean square of the distances
+    /// that these leave \[m\].
+    fn search(
         &self,
         first: Candidate,
         own: &[Vector3<f64>],
     ) -> Result<(Candidate, f64), InvalidInput> {
+        // Nearest rods of these lengths, with any bends, then with those that are allowed.
         let twists: Vec<f64> = own.iter().map(|rest| rest.z).collect();
         let (robot, targets, kind) = (self.robot, self.targets, self.settings.rod.subsegment);
-        let chain = Chain { robot, targets, kind, twists: &twists, most: PI, stop: self.stop };
-        let mut ways = chain.ways(own)?;
-        let least = ways.first().map_or(0.0, |way| way.cost);
+        let problem =
+            NearestRodProblem { robot, targets, kind, twists: &twists, most: PI, stop: self.stop };
+        let mut rods = problem.minima(own)?;
+        let least = rods.first().map_or(0.0, |rod| rod.cost);
         if self.settings.max_bend < PI {
-            ways.extend(Chain { most: self.settings.max_bend, ..chain }.ways(own)?);
+            rods.extend(NearestRodProblem { most: self.settings.max_bend, ..problem }.minima(own)?);
         }
+        // What follows and is as near as lengths allow ends the search.
         let enough = least * (1.0 + ENOUGH);
         let done = |candidate: &Candidate| Self::rank(candidate) <= (false, enough);
+        // Starts: rest shapes whose places under tension are those of the nearest rods.
         let mut starts: Vec<Candidate> = Vec::new();
-        for way in ways {
-            if self.stopped() || starts.last().is_some_and(done) {
+        for rod in rods {
+            if self.is_stopped() || starts.last().is_some_and(done) {
                 break;
             }
-            starts.push(match self.marched(&way.places)? {
+            starts.push(match self.invert_stepwise(&rod.places)? {
                 Some(candidate) if candidate.shape.report.status == Status::Converged => candidate,
-                _ => self.solved(way.bends, None, 0)?,
+                _ => self.solve(rod.bends, None, 0)?,
             });
         }
         // These follow where bends that fight the tendons do not.
         let straight: Vec<_> = own.iter().map(|rest| Vector3::new(0.0, 0.0, rest.z)).collect();
         for rest in [straight, own.to_vec()] {
-            starts.push(self.solved(rest, None, 0)?);
+            starts.push(self.solve(rest, None, 0)?);
         }
         starts.sort_by(|a, b| Self::rank(a).partial_cmp(&Self::rank(b)).unwrap_or(Ordering::Equal));
         starts.truncate(REFINED);
+        // Descents from the best of them, pulled from rest again.
         let mut best = first;
         for start in starts {
-            if self.stopped() || self.met(&best) || done(&best) {
+            if self.is_stopped() || self.is_met(&best) || done(&best) {
                 break;
             }
-            let next = self.pulled(self.refined(start)?)?;
+            let next = self.solve_from_rest(self.refine(start)?)?;
             let iterations = best.iterations + next.iterations;
             if Self::rank(&next) < Self::rank(&best) {
                 best = next;
@@ -282,30 +287,30 @@ impl Design<'_> {
         Ok((best, rms))
     }
 
-    /// What follows the displacements comes first, then what is nearer.
+    /// Order of candidates: those that follow the displacements first, then by distance.
     fn rank(candidate: &Candidate) -> (bool, f64) {
         let status = candidate.shape.report.status;
         (status != Status::Converged, candidate.residual.norm_squared())
     }
 
     /// The outcome; `reach` is the root mean square of the distances that lengths alone leave \[m\], if known.
-    fn told(&self, done: Candidate, reach: Option<f64>) -> Prebend {
+    fn outcome(&self, done: Candidate, reach: Option<f64>) -> Prebend {
         let errors = self.errors(&done.shape);
         let worst = errors.iter().copied().fold(0.0_f64, f64::max);
         let (status, message) = if done.shape.report.status != Status::Converged {
             let text = format!("the rod does not follow the displacements: {}", done.shape.message);
             (done.shape.report.status, text)
-        } else if self.reached(&done) {
+        } else if self.reaches(&done) {
             (Status::Converged, String::new())
         } else if self.settings.smoothness > 0.0 {
             let disk = errors.iter().position(|e| *e == worst).unwrap_or(0);
             let what = "with smoothness: the least sum of both";
             (Status::Converged, format!("disk {disk} stays {worst:.3e} m from its place, {what}"))
-        } else if self.stopped() {
+        } else if self.is_stopped() {
             (Status::IterationLimit, "stopped before the end".to_owned())
         } else {
             let disk = errors.iter().position(|e| *e == worst).unwrap_or(0);
-            let why = self.why(&done, &errors, reach);
+            let why = self.reason(&done, &errors, reach);
             let text = format!("disk {disk} stays {worst:.3e} m from its place{why}");
             (Status::Unreachable, text)
         };
@@ -313,15 +318,15 @@ impl Design<'_> {
         Prebend { robot, shape, errors, iterations, status, message }
     }
 
-    /// What keeps the disks from their places, as the end of a message: lengths, where they explain at least half
+    /// Reason why the disks stay off their places, as the end of a message: lengths, where they explain at least half
     /// of the distances, or the bound of bends.
-    fn why(&self, done: &Candidate, errors: &[f64], reach: Option<f64>) -> String {
+    fn reason(&self, done: &Candidate, errors: &[f64], reach: Option<f64>) -> String {
         let mean = errors.iter().map(|e| e * e).sum::<f64>() / self.targets.len() as f64;
         if reach.is_some_and(|reach| reach >= 0.5 * mean.sqrt()) {
             let worst = errors.iter().copied().fold(0.0_f64, f64::max);
             // Lengths that are off by less would explain less than a tenth of it, all together.
             let off = 0.1 * worst / self.length();
-            return hindrance(self.robot, self.targets, self.settings.rod.subsegment, off);
+            return infeasible_chord(self.robot, self.targets, self.settings.rod.subsegment, off);
         }
         let most = self.settings.max_bend;
         let bound = |rest: &Vector3<f64>| rest.xy().norm() >= most * (1.0 - 1e-9);
@@ -331,7 +336,7 @@ impl Design<'_> {
     }
 }
 
-impl Bent for Design<'_> {
+impl BendProblem for Design<'_> {
     const HEADWAY: f64 = 1e-9;
 
     type Point = Candidate;
@@ -349,15 +354,15 @@ impl Bent for Design<'_> {
         bends: Vec<Vector3<f64>>,
         near: &Candidate,
     ) -> Result<Option<Candidate>, InvalidInput> {
-        let next = self.solved(bends, Some(&near.shape), near.iterations + 1)?;
+        let next = self.solve(bends, Some(&near.shape), near.iterations + 1)?;
         Ok((next.shape.report.status == Status::Converged).then_some(next))
     }
 
-    fn met(&self, candidate: &Candidate) -> bool {
-        self.settings.smoothness == 0.0 && self.reached(candidate)
+    fn is_met(&self, candidate: &Candidate) -> bool {
+        self.settings.smoothness == 0.0 && self.reaches(candidate)
     }
 
-    fn stopped(&self) -> bool {
+    fn is_stopped(&self) -> bool {
         self.stop.load(Memory::Relaxed)
     }
 
@@ -373,9 +378,9 @@ impl Bent for Design<'_> {
         for i in 0..n {
             for c in 0..2 {
                 change.rest[i][c] = 1.0;
-                let told = sensitivity.forward(&change);
+                let variation = sensitivity.forward(&change);
                 change.rest[i][c] = 0.0;
-                for (j, velocity) in told.velocities.iter().skip(1).enumerate() {
+                for (j, velocity) in variation.velocities.iter().skip(1).enumerate() {
                     for k in 0..3 {
                         out[(3 * j + k, 2 * i + c)] = velocity[k] / self.length();
                     }

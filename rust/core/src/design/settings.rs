@@ -13,7 +13,7 @@ use crate::rod::RodSettings;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrebendSettings {
-    /// Of the rod model that the design is for.
+    /// Settings of the rod model that the design is for.
     pub rod: RodSettings,
     /// Largest bend of a subsegment at rest \[rad\].
     pub max_bend: f64,

@@ -20,7 +20,7 @@ pub(super) struct Answer {
 
 /// Inverts step by step with the tensions that the displacements ask for; none when it finds none. Tendons that would
 /// have to push are slack.
-pub(super) fn march(
+pub(super) fn solve_tensions(
     plan: &Plan,
     base: &Pose,
     targets: &[Vector3<f64>],
@@ -32,7 +32,7 @@ pub(super) fn march(
     let mut answer =
         Answer { march: StepwiseInverse::default(), tensions: vec![0.0; count], iterations: 0 };
     for _ in 0..2 * count + 2 {
-        meet(plan, base, targets, twists, displacements, &taut, &mut answer)?;
+        meet_displacements(plan, base, targets, twists, displacements, &taut, &mut answer)?;
         let pushing = taut.iter().copied().find(|k| answer.tensions[*k] < 0.0);
         if let Some(slack) = pushing {
             taut.retain(|k| *k != slack);
@@ -50,7 +50,7 @@ pub(super) fn march(
 }
 
 /// Newton's method for the tensions of the taut tendons, with differences for derivatives: a march is cheap.
-fn meet(
+fn meet_displacements(
     plan: &Plan,
     base: &Pose,
     targets: &[Vector3<f64>],
@@ -59,6 +59,7 @@ fn meet(
     taut: &[usize],
     answer: &mut Answer,
 ) -> Option<()> {
+    // Excess Σ L(ω) − Σ L(ω_rest) − C T − displacement of every taut tendon.
     let length = plan.total_length();
     let excess = |march: &StepwiseInverse, tensions: &[f64]| {
         DVector::from_iterator(
@@ -68,29 +69,33 @@ fn meet(
             }),
         )
     };
-    let go = |answer: &mut Answer, tensions: &[f64]| {
+    let invert = |answer: &mut Answer, tensions: &[f64]| {
         answer.iterations += 1;
         answer.march.solve(plan, base, targets, twists, tensions)
     };
+    // From the tensions at hand.
     let start = answer.tensions.clone();
-    if !go(answer, &start) {
+    if !invert(answer, &start) {
         return None;
     }
     let mut off = excess(&answer.march, &answer.tensions);
+    // Step of the differences, in the plan's unit of tensions.
     let step = 1e-6 / plan.slenderness;
     for _ in 0..STEPS {
         if off.amax() <= MET * length {
             return Some(());
         }
+        // Slopes by one tension after the other.
         let mut slopes = DMatrix::zeros(taut.len(), taut.len());
         for (column, &k) in taut.iter().enumerate() {
             let mut moved = answer.tensions.clone();
             moved[k] += step;
-            if !go(answer, &moved) {
+            if !invert(answer, &moved) {
                 return None;
             }
             slopes.set_column(column, &((excess(&answer.march, &moved) - &off) / step));
         }
+        // Newton's step, halved until the largest excess falls.
         let change = slopes.lu().solve(&off)?;
         let (mut share, before) = (1.0, off.amax());
         loop {
@@ -98,7 +103,7 @@ fn meet(
             for (row, &k) in taut.iter().enumerate() {
                 moved[k] -= share * change[row];
             }
-            if go(answer, &moved) {
+            if invert(answer, &moved) {
                 off = excess(&answer.march, &moved);
                 if off.amax() < before {
                     answer.tensions = moved;
@@ -109,7 +114,7 @@ fn meet(
             if share < 1e-6 {
                 // Rounding, or no way down.
                 let tensions = answer.tensions.clone();
-                go(answer, &tensions);
+                invert(answer, &tensions);
                 return (before <= 1e-12 * length).then_some(());
             }
         }

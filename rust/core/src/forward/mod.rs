@@ -260,7 +260,7 @@ impl<'r> Forward<'r> {
         let rod = Rod::new(self.robot, plan).stopped_by(Arc::clone(self.first_fault.stop()));
         let mut work = rod::Scratch::default();
         rod.solve_from(shape, displacements, &mut work)?;
-        Ok(rod.sensitivity(displacements, &work).linearized())
+        Ok(rod.sensitivity(displacements, &work).linearization())
     }
 
     /// Time that a hard solve takes, by the size of the robot \[µs\]: what decides if a caller waits or listens.

@@ -59,8 +59,8 @@ pub(super) struct LoadStepping {
 }
 
 impl LoadStepping {
-    /// Solves from the strains of a system without tensions to target tensions of a unit. Where no shorter load step helps,
-    /// the system is left at the last load that was reached.
+    /// Solves from the strains of a system without tensions to target tensions of a unit. Where no shorter load step
+    /// helps, the system is left at the last load that was reached.
     pub(super) fn solve(
         &mut self,
         plan: &Plan,

@@ -109,8 +109,9 @@ impl Scratch {
         part.active.clear();
         for (piece, rest) in plan.pieces[range.clone()].iter().zip(&plan.piece_lengths[range]) {
             let k = piece.tendon;
-            let ratio = 1.0 + displacements[k] / plan.rest_lengths[k];
-            part.bounds.push(if self.drives[k] { ratio * rest } else { f64::INFINITY });
+            let law = plan.settings.tendons;
+            let bound = law.bound(*rest, plan.rest_lengths[k], displacements[k]);
+            part.bounds.push(if self.drives[k] { bound } else { f64::INFINITY });
             part.active.push(self.drives[k]);
         }
     }

@@ -55,6 +55,8 @@ pub(super) struct BoundRate {
     pub(super) tendon: f64,
     /// Rate of the displacement.
     pub(super) displacement: f64,
+    /// Of the elastic strain.
+    pub(super) strain: f64,
 }
 
 impl TendonLaw {
@@ -103,6 +105,14 @@ impl TendonLaw {
         }
     }
 
+    /// Bound of the length of a piece's equation, for the lengths at rest of the piece and of its whole tendon.
+    pub(super) fn bound(self, piece: f64, tendon: f64, displacement: f64) -> f64 {
+        match self {
+            Self::Sliding => tendon + displacement,
+            Self::Proportional => (1.0 + displacement / tendon) * piece,
+        }
+    }
+
     /// Derivative of a piece's bound by its tendon's displacement.
     pub(super) fn bound_slope(self, piece: f64, tendon: f64) -> f64 {
         match self {
@@ -114,12 +124,15 @@ impl TendonLaw {
     /// Share of a piece in the rate of its equation's bound, elasticity of the tendon included.
     pub(super) fn bound_rate(self, at: &PieceBound, rate: &BoundRate) -> f64 {
         match self {
-            Self::Sliding if at.first => rate.tendon * (1.0 + at.strain) + rate.displacement,
+            Self::Sliding if at.first => {
+                rate.tendon * (1.0 + at.strain) + rate.displacement + at.tendon * rate.strain
+            }
             Self::Sliding => 0.0,
             Self::Proportional => {
                 let ratio =
                     (rate.displacement - at.displacement * rate.tendon / at.tendon) / at.tendon;
-                rate.piece * (1.0 + at.displacement / at.tendon + at.strain) + at.piece * ratio
+                let strain = 1.0 + at.displacement / at.tendon + at.strain;
+                rate.piece * strain + at.piece * (ratio + rate.strain)
             }
         }
     }
@@ -130,6 +143,7 @@ impl TendonLaw {
             Self::Sliding if at.first => BoundRate {
                 tendon: weight * (1.0 + at.strain),
                 displacement: weight,
+                strain: weight * at.tendon,
                 ..BoundRate::default()
             },
             Self::Sliding => BoundRate::default(),
@@ -139,6 +153,7 @@ impl TendonLaw {
                     piece: weight * (1.0 + at.displacement / at.tendon + at.strain),
                     tendon: -(displacement * at.displacement / at.tendon),
                     displacement,
+                    strain: weight * at.piece,
                 }
             }
         }

@@ -1,4 +1,5 @@
 //! Design inverses from Python.
 
+pub(crate) mod fit;
 pub(crate) mod prebend;
 pub(crate) mod routing;

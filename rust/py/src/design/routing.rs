@@ -17,7 +17,7 @@ use crate::settings::routing::RoutingSettings;
 
 /// Robot, shape, displacements, holes, errors, root mean squares, optimality, iterations, evaluations, status and
 /// message.
-fn told<'py>(
+fn fields<'py>(
     py: Python<'py>,
     answer: Routed,
     settings: &design::RoutingSettings,
@@ -68,10 +68,10 @@ pub(crate) fn _routing<'py>(
     let answer = interruptible::run(py, None, |control| {
         routing_stopped_by(core, &targets, bounds.as_ref(), from, &settings, &control.stop)
     })?;
-    told(py, answer.map_err(|e| invalid(&e))?, &settings)
+    fields(py, answer.map_err(|e| invalid(&e))?, &settings)
 }
 
-/// Routings of every row, on `threads`.
+/// Nearest routings of all rows, on `threads`.
 #[pyfunction]
 pub(crate) fn _routing_batch<'py>(
     py: Python<'py>,
@@ -91,5 +91,5 @@ pub(crate) fn _routing_batch<'py>(
         routing_rows(core, &rows, bounds.as_ref(), &settings, &pool, control)
     })?;
     let answers = answers.map_err(|e| invalid(&e))?.unwrap_or_default();
-    answers.into_iter().map(|answer| told(py, answer, &settings)).collect()
+    answers.into_iter().map(|answer| fields(py, answer, &settings)).collect()
 }

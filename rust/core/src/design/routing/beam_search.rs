@@ -7,18 +7,18 @@
 
 use nalgebra::Vector3;
 
-use super::quadratic_cost::Sums;
-use super::subsegment_table::{Field, Link};
+use super::quadratic_cost::QuadraticCost;
+use super::subsegment_table::{Link, SubsegmentTables};
 use super::task::{Holes, Task};
 use crate::lie::Pose;
 
-/// A beginning of a routing. Its sums are those of `Sums`.
+/// Beginning of a routing, and its cost.
 #[derive(Clone)]
 struct Node {
     pose: Pose,
     /// Velocity and angular velocity of its last disk by each tension.
     rates: Vec<(Vector3<f64>, Vector3<f64>)>,
-    sums: Sums,
+    cost: QuadraticCost,
     /// Its place in the level before, and its choice on its last disk.
     parent: usize,
     choice: usize,
@@ -44,8 +44,8 @@ impl Node {
             *v = own.0;
         }
         self.pose = self.pose.compose(link.end);
-        self.sums.add_pulls(link.pulls, link.pull_slopes);
-        self.sums.add(&(self.pose.translation - target), velocity);
+        self.cost.add_pulls(link.pulls, link.pull_slopes);
+        self.cost.add(&(self.pose.translation - target), velocity);
     }
 }
 
@@ -55,8 +55,13 @@ pub(super) struct Window<'w> {
     pub(super) width: &'w [f64],
 }
 
-/// The routings of a field, nearest first, as many as the beam is wide. Nothing when it was stopped.
-pub(super) fn search(task: &Task<'_>, field: &Field, window: &Window<'_>) -> Option<Vec<Leaf>> {
+/// Routings of the tables' choices, nearest first, as many as the beam is wide. Nothing when it was stopped.
+pub(super) fn beam_search(
+    task: &Task<'_>,
+    tables: &SubsegmentTables,
+    window: &Window<'_>,
+) -> Option<Vec<Leaf>> {
+    // Window about the tensions T: changes δ from `lower` to `upper`, none of which makes a tension negative.
     let count = task.tendons();
     let upper = window.width;
     let tensions = window.tensions.iter().zip(upper);
@@ -66,28 +71,31 @@ pub(super) fn search(task: &Task<'_>, field: &Field, window: &Window<'_>) -> Opt
     let root = |choice| Node {
         pose: *task.robot.base(),
         rates: vec![(Vector3::zeros(), Vector3::zeros()); count],
-        sums: Sums::of(task),
+        cost: QuadraticCost::of(task),
         parent: 0,
         choice,
     };
-    let mut levels: Vec<Vec<Node>> = vec![(0..field.choices[0].len()).map(root).collect()];
+    // Level 0: every choice on the base disk, at G₀ = base.
+    let mut levels: Vec<Vec<Node>> = vec![(0..tables.choices[0].len()).map(root).collect()];
     let shares = task.shares();
     let mut child = root(0);
     for (i, target) in task.targets.iter().enumerate() {
+        // Children: every beginning goes on by every choice, and is judged at min over δ of |r + D δ|².
         let nodes = levels.last()?;
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
         for (parent, node) in nodes.iter().enumerate() {
-            if task.stopped() {
+            if task.is_stopped() {
                 return None;
             }
-            for choice in 0..field.choices[i + 1].len() {
-                let Some(link) = field.link(i, node.choice, choice) else { continue };
+            for choice in 0..tables.choices[i + 1].len() {
+                let Some(link) = tables.link(i, node.choice, choice) else { continue };
                 child.clone_from(node);
                 child.add(&link, target, &mut velocity);
-                child.sums.penalise(task, shares[i]);
-                found.push((child.sums.least(&lower, upper, &mut change), parent, choice));
+                child.cost.penalise(task, shares[i]);
+                found.push((child.cost.least(&lower, upper, &mut change), parent, choice));
             }
         }
+        // Beam: the nearest children stay, ties by their place.
         let order = |a: &(f64, usize, usize), b: &(f64, usize, usize)| {
             a.0.total_cmp(&b.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)))
         };
@@ -97,33 +105,35 @@ pub(super) fn search(task: &Task<'_>, field: &Field, window: &Window<'_>) -> Opt
             found.truncate(width);
         }
         found.sort_by(order);
+        // They are built anew: of the others only the costs were needed.
         let next = found.iter().filter_map(|&(_, parent, choice)| {
             let mut child = nodes[parent].clone();
-            let link = field.link(i, child.choice, choice)?;
+            let link = tables.link(i, child.choice, choice)?;
             child.add(&link, target, &mut velocity);
             Some(Node { parent, choice, ..child })
         });
         let next = next.collect();
         levels.push(next);
     }
+    // Whole routings, each at its own T + δ.
     let mut leaves = Vec::new();
     for (place, node) in levels.last()?.iter().enumerate() {
-        let mut sums = node.sums.clone();
-        sums.penalise(task, 1.0);
-        let value = sums.least(&lower, upper, &mut change);
+        let mut cost = node.cost.clone();
+        cost.penalise(task, 1.0);
+        let value = cost.least(&lower, upper, &mut change);
         let tensions = window.tensions.iter().zip(&change).map(|(t, c)| t + c).collect();
-        let holes = trace(field, &levels, place);
-        leaves.push(Leaf { holes, tensions, value, slope: sums.slope });
+        let holes = trace_holes(tables, &levels, place);
+        leaves.push(Leaf { holes, tensions, value, slope: cost.slope });
     }
     Some(leaves)
 }
 
 /// The holes that led to a place of the last level.
-fn trace(field: &Field, levels: &[Vec<Node>], mut place: usize) -> Holes {
+fn trace_holes(tables: &SubsegmentTables, levels: &[Vec<Node>], mut place: usize) -> Holes {
     let mut holes = vec![Vec::new(); levels.len()];
     for (disk, level) in levels.iter().enumerate().rev() {
         let node = &level[place];
-        holes[disk].clone_from(&field.choices[disk][node.choice]);
+        holes[disk].clone_from(&tables.choices[disk][node.choice]);
         place = node.parent;
     }
     holes

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::quadratic_cost::Sums;
+use super::quadratic_cost::QuadraticCost;
 use super::task::{Holes, Task};
 use crate::rod::one_subsegment::OneSubsegment;
 
@@ -24,37 +24,38 @@ const HALVES: usize = 40;
 const ROUNDING: f64 = 1e-14;
 
 /// The subsegments of a robot, routed and solved one by one.
-pub(super) struct Follower {
+pub(super) struct TensionSolver {
     stages: Vec<OneSubsegment>,
     near: Vec<Vec<f64>>,
     /// Steps that were taken.
     pub(super) steps: usize,
 }
 
-/// What a set of tensions does.
-struct Placed {
-    sums: Sums,
+/// Cost and strains under a set of tensions.
+struct CostAtTensions {
+    cost: QuadraticCost,
     strains: Vec<Vec<f64>>,
 }
 
-impl Follower {
+impl TensionSolver {
     pub(super) fn new(task: &Task<'_>) -> Self {
         let n = task.targets.len();
         let stages = (0..n).map(|i| OneSubsegment::new(&task.plan, i)).collect();
         Self { stages, near: vec![Vec::new(); n], steps: 0 }
     }
 
-    pub(super) fn solved(&self) -> usize {
+    pub(super) fn equilibria(&self) -> usize {
         self.stages.iter().map(|stage| stage.solved).sum()
     }
 
     /// Squared distances and their derivatives by the tensions. Nothing where a subsegment has no shape.
-    fn place(&mut self, task: &Task<'_>, tensions: &[f64]) -> Option<Placed> {
+    fn evaluate(&mut self, task: &Task<'_>, tensions: &[f64]) -> Option<CostAtTensions> {
         let count = tensions.len();
         let mut frame = *task.robot.base();
         let mut rates = vec![(Vector3::zeros(), Vector3::zeros()); count];
         let mut velocity = vec![Vector3::zeros(); count];
-        let (mut sums, mut strains) = (Sums::of(task), Vec::with_capacity(self.stages.len()));
+        let (mut cost, mut strains) =
+            (QuadraticCost::of(task), Vec::with_capacity(self.stages.len()));
         for ((stage, near), target) in self.stages.iter_mut().zip(&self.near).zip(task.targets) {
             if !stage.solve(tensions, near) {
                 return None;
@@ -73,19 +74,19 @@ impl Follower {
             for (velocity, rate) in velocity.iter_mut().zip(&rates) {
                 *velocity = rate.0;
             }
-            sums.add(&(frame.translation - target), &velocity);
+            cost.add(&(frame.translation - target), &velocity);
             if task.bounds.is_some() {
                 let (pulls, slopes) = stage.displacements(count);
-                sums.add_pulls(&pulls, &slopes);
+                cost.add_pulls(&pulls, &slopes);
             }
         }
-        sums.penalise(task, 1.0);
-        Some(Placed { sums, strains })
+        cost.penalise(task, 1.0);
+        Some(CostAtTensions { cost, strains })
     }
 
-    /// Where between two tensions the value of a routing of one tendon ends to fall, or the last at which it has a
-    /// shape.
-    pub(super) fn bottom(
+    /// Tension between two others at which the cost of a routing of one tendon stops falling, or the last at which it
+    /// has a shape.
+    pub(super) fn valley_bottom(
         &mut self,
         task: &Task<'_>,
         holes: &Holes,
@@ -95,7 +96,7 @@ impl Follower {
         self.route(task, holes, count);
         for _ in 0..HALVES {
             let middle = 0.5 * (low + high);
-            if self.place(task, &[middle]).is_some_and(|placed| placed.sums.slope[0] < 0.0) {
+            if self.evaluate(task, &[middle]).is_some_and(|placed| placed.cost.slope[0] < 0.0) {
                 low = middle;
             } else {
                 high = middle;
@@ -114,29 +115,32 @@ impl Follower {
 
     /// Gauss-Newton steps on the tensions, none of which becomes negative. Nothing where the routing has no
     /// shape under the first ones.
-    pub(super) fn polish(
+    pub(super) fn solve(
         &mut self,
         task: &Task<'_>,
         holes: &Holes,
         count: usize,
         tensions: &[f64],
     ) -> Option<Candidate> {
+        // Cost |r|² and its slopes at the first tensions.
         self.route(task, holes, count);
         let mut tensions = tensions.to_vec();
-        let mut here = self.place(task, &tensions)?;
+        let mut here = self.evaluate(task, &tensions)?;
         let least = (ROUNDING * task.length()).powi(2);
         let mut damping = 0.0;
         for _ in 0..STEPS {
-            if here.sums.value <= least || task.stopped() {
+            if here.cost.value <= least || task.is_stopped() {
                 break;
             }
+            // Step on (DᵀD + damping) δ = −Dᵀr.
             self.near.clone_from(&here.strains);
             self.steps += 1;
             let moved = step(&here, &tensions, damping);
-            let headway = |value: f64| 1.0 - value / here.sums.value;
-            match self.place(task, &moved) {
-                Some(next) if next.sums.value < here.sums.value => {
-                    let small = headway(next.sums.value) < HEADWAY;
+            let headway = |value: f64| 1.0 - value / here.cost.value;
+            // Taken if it is nearer, else more damped.
+            match self.evaluate(task, &moved) {
+                Some(next) if next.cost.value < here.cost.value => {
+                    let small = headway(next.cost.value) < HEADWAY;
                     (here, tensions, damping) = (next, moved, 0.1 * damping);
                     if small {
                         break;
@@ -144,7 +148,7 @@ impl Follower {
                 }
                 other => {
                     // Rounding, or a step that was too long.
-                    let level = other.is_some_and(|next| -headway(next.sums.value) < HEADWAY);
+                    let level = other.is_some_and(|next| -headway(next.cost.value) < HEADWAY);
                     if level || damping > 1e6 {
                         break;
                     }
@@ -152,22 +156,22 @@ impl Follower {
                 }
             }
         }
-        Some(Candidate { holes: holes.clone(), tensions, value: here.sums.value })
+        Some(Candidate { holes: holes.clone(), tensions, value: here.cost.value })
     }
 }
 
 /// Tensions after a damped step; those that would become negative, or are 0 and would stay so, are held at 0.
-fn step(here: &Placed, tensions: &[f64], damping: f64) -> Vec<f64> {
+fn step(here: &CostAtTensions, tensions: &[f64], damping: f64) -> Vec<f64> {
     let count = tensions.len();
     let mut free: Vec<usize> =
-        (0..count).filter(|&k| tensions[k] > 0.0 || here.sums.slope[k] < 0.0).collect();
+        (0..count).filter(|&k| tensions[k] > 0.0 || here.cost.slope[k] < 0.0).collect();
     loop {
         let mut out = vec![0.0; count];
         let gram = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-            let own = here.sums.bend[free[a] * count + free[b]];
+            let own = here.cost.bend[free[a] * count + free[b]];
             if a == b { own * (1.0 + 1e-12 + damping) } else { own }
         });
-        let right = DVector::from_fn(free.len(), |a, _| here.sums.slope[free[a]]);
+        let right = DVector::from_fn(free.len(), |a, _| here.cost.slope[free[a]]);
         let Some(change) = gram.cholesky().map(|factor| factor.solve(&right)) else {
             return tensions.to_vec();
         };

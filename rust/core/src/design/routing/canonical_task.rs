@@ -7,8 +7,7 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 
 use super::settings::RoutingSettings;
-use super::solver::FINE;
-use super::task::{Holes, PerHole};
+use super::task::{FINE, Holes, PerHole};
 use crate::error::InvalidInput;
 use crate::inverse::Range;
 use crate::lie::so3;
@@ -24,7 +23,7 @@ const UPWARDS: f64 = 0.75;
 
 /// A routing design in the base's frame, turned about its axis so that the wanted places lean towards azimuth 0, with
 /// tendons in an order of their own.
-pub(super) struct Posed {
+pub(super) struct CanonicalTask {
     pub(super) robot: Robot,
     pub(super) targets: Vec<Vector3<f64>>,
     pub(super) bounds: Option<Range>,
@@ -40,8 +39,8 @@ pub(super) struct Posed {
     turn: f64,
 }
 
-impl Posed {
-    /// Of checked arguments.
+impl CanonicalTask {
+    /// Canonical form of checked arguments.
     pub(super) fn new(
         robot: &Robot,
         targets: &[Vector3<f64>],
@@ -49,17 +48,20 @@ impl Posed {
         start: Option<(&Robot, &[f64])>,
         settings: &RoutingSettings,
     ) -> Result<Self, InvalidInput> {
-        let (order, classes) = ordered(robot, bounds);
+        // Order of the tendons, and turn of the base's frame to where the places lean.
+        let (order, classes) = sort_tendons(robot, bounds);
         let base = robot.base();
         let local = targets.iter().map(|t| base.rotation.tr_mul(&(t - base.translation)));
         let local: Vec<_> = local.collect();
         let length = robot.backbone().total_length();
-        let (shift, turn) = turned(&local, length, settings);
+        let (shift, turn) = turn_to_lean(&local, length, settings);
         let back = so3::exp(&Vector3::new(0.0, 0.0, -turn));
+        // Wanted places on a grid, so that a rounding elsewhere does not count.
         let finest = length * GRID.min(FINER * settings.tolerance);
         let grid = finest.log2().floor().exp2();
         let rounded = |target: Vector3<f64>| (back * target).map(|x| (x / grid).round() * grid);
 
+        // Rest shape in the turned frame.
         let mut spec = robot.backbone().spec().clone();
         if turn != 0.0 {
             spec.rest = spec.rest.map(|rest| rest.iter().map(|own| back * own).collect());
@@ -72,6 +74,7 @@ impl Posed {
             Tendon::new(routing, Some(robot.paths()[*k].end()), own.stiffness(), None)
         });
         let tendons = tendons.collect::<Result<_, _>>()?;
+        // Bounds and start in the order of the tendons; bounds that bound nothing are none.
         let finite = |range: &&Range| {
             let (lower, upper) = range.values();
             lower.iter().chain(upper).any(|bound| bound.is_finite())
@@ -130,15 +133,15 @@ pub(super) fn radii(robot: &Robot, tendon: usize) -> Vec<f64> {
 }
 
 /// Order of the tendons by what tells them apart, and the class of each.
-fn ordered(robot: &Robot, bounds: Option<&Range>) -> (Vec<usize>, Vec<usize>) {
-    let told = |k: usize| -> Vec<f64> {
+fn sort_tendons(robot: &Robot, bounds: Option<&Range>) -> (Vec<usize>, Vec<usize>) {
+    let key = |k: usize| -> Vec<f64> {
         let tendon = &robot.tendons()[k];
         let (low, high) = bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |bounds| bounds.at(k));
         let end = robot.paths()[k].end() as f64;
         let first = [end, tendon.stiffness().unwrap_or(f64::INFINITY), low + 0.0, high + 0.0];
         first.into_iter().chain(radii(robot, k)).collect()
     };
-    let all: Vec<Vec<f64>> = (0..robot.tendons().len()).map(told).collect();
+    let all: Vec<Vec<f64>> = (0..robot.tendons().len()).map(key).collect();
     let compare = |a: &[f64], b: &[f64]| {
         let differ = a.iter().zip(b).map(|(a, b)| a.total_cmp(b));
         differ.fold(Ordering::Equal, Ordering::then)
@@ -155,7 +158,7 @@ fn ordered(robot: &Robot, bounds: Option<&Range>) -> (Vec<usize>, Vec<usize>) {
 }
 
 /// Holes, and azimuth in all, from the base's x axis to where the wanted places lean.
-fn turned(local: &[Vector3<f64>], length: f64, settings: &RoutingSettings) -> (usize, f64) {
+fn turn_to_lean(local: &[Vector3<f64>], length: f64, settings: &RoutingSettings) -> (usize, f64) {
     let aside: Vector3<f64> = local.iter().sum();
     let leans = aside.xy().norm() > ASIDE * length;
     let azimuth = if leans { aside.y.atan2(aside.x) } else { settings.azimuth };

@@ -12,14 +12,14 @@ use crate::rod::{Plan, Rod, Scratch, Sensitivity};
 use crate::solve::pseudo_inverse::PseudoInverse;
 use crate::status::Status;
 
-/// What is pulled with: tensions reach every shape near by, displacements can be bounded.
+/// Kind of pulls: tensions reach every shape near by, displacements can be bounded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pulls {
     Tensions,
     Displacements,
 }
 
-/// What a descent may change.
+/// Unknowns that a descent may change.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Freedom {
     pub(super) azimuths: bool,
@@ -38,7 +38,7 @@ impl Freedom {
         Self { azimuths: true, radii: task.settings.radius, pulls: Pulls::Tensions }
     }
 
-    /// What so many unknowns are measured in, in their order: radians, lengths of the robot, the tension that is one
+    /// Units of so many unknowns, in their order: radians, lengths of the robot, the tension that is one
     /// bending stiffness over length².
     pub(super) fn units(&self, task: &Task<'_>, count: usize) -> Vec<f64> {
         let mut units = Vec::with_capacity(count);
@@ -69,7 +69,7 @@ pub(super) struct Point {
 
 impl Point {
     /// Under tensions, in the unit of the results. Nothing if there is no such shape.
-    pub(super) fn under(
+    pub(super) fn at_tensions(
         task: &Task<'_>,
         robot: Robot,
         (azimuths, radii): (PerHole, PerHole),
@@ -87,18 +87,18 @@ impl Point {
         Ok(Some(Self { azimuths, radii, robot, state, displacements, value }))
     }
 
-    /// The same routing under displacements.
-    pub(super) fn pulled(
+    /// Routing under displacements.
+    pub(super) fn at_displacements(
         &self,
         task: &Task<'_>,
         displacements: Vec<f64>,
     ) -> Result<Option<Self>, InvalidInput> {
         let holes = (self.azimuths.clone(), self.radii.clone());
-        Self::at(task, self.robot.clone(), holes, displacements, &self.state)
+        Self::near(task, self.robot.clone(), holes, displacements, &self.state)
     }
 
     /// Under displacements, near another shape.
-    fn at(
+    fn near(
         task: &Task<'_>,
         robot: Robot,
         (azimuths, radii): (PerHole, PerHole),
@@ -127,7 +127,7 @@ impl Point {
         own.map(bounded).collect()
     }
 
-    pub(super) fn met(&self, task: &Task<'_>, share: f64) -> bool {
+    pub(super) fn is_met(&self, task: &Task<'_>, share: f64) -> bool {
         task.errors(&self.state)
             .iter()
             .all(|e| *e <= share * task.settings.tolerance * task.length())
@@ -161,7 +161,7 @@ impl Point {
     }
 
     /// The point of other unknowns.
-    pub(super) fn moved(
+    pub(super) fn with_unknowns(
         &self,
         task: &Task<'_>,
         freedom: &Freedom,
@@ -182,9 +182,9 @@ impl Point {
         }
         let robot = task.with_azimuths(&azimuths, &radii)?;
         match freedom.pulls {
-            Pulls::Tensions => Self::under(task, robot, (azimuths, radii), rest),
+            Pulls::Tensions => Self::at_tensions(task, robot, (azimuths, radii), rest),
             Pulls::Displacements => {
-                Self::at(task, robot, (azimuths, radii), rest.to_vec(), &self.state)
+                Self::near(task, robot, (azimuths, radii), rest.to_vec(), &self.state)
             }
         }
     }
@@ -215,19 +215,21 @@ impl Point {
         Ok(places)
     }
 
-    /// What holes and displacements do to places and to tensions.
+    /// Derivatives of places and of tensions by holes and displacements.
     fn columns(
         &self,
         task: &Task<'_>,
         freedom: &Freedom,
         sensitivity: &Sensitivity<'_>,
     ) -> (DMatrix<f64>, DMatrix<f64>) {
+        // Changes of one hole at a time: around the disk's centre, then away from it.
         let mut change = sensitivity.no_change();
-        let mut told = Vec::new();
+        let mut variations = Vec::new();
         for k in 0..task.tendons() {
             let holes = self.azimuths[k].iter().zip(&self.radii[k]);
             let holes: Vec<(f64, f64)> =
                 holes.map(|(azimuth, radius)| (*azimuth, *radius)).collect();
+            // ∂h/∂azimuth and ∂h/∂radius.
             let around = |(azimuth, radius): (f64, f64)| {
                 Vector3::new(-radius * azimuth.sin(), radius * azimuth.cos(), 0.0)
             };
@@ -235,7 +237,7 @@ impl Point {
             let mut add = |moves: &dyn Fn((f64, f64)) -> Vector3<f64>| {
                 for (disk, hole) in holes.iter().enumerate() {
                     change.holes[k][disk] = moves(*hole);
-                    told.push(sensitivity.forward(&change));
+                    variations.push(sensitivity.forward(&change));
                     change.holes[k][disk] = Vector3::zeros();
                 }
             };
@@ -246,15 +248,18 @@ impl Point {
                 add(&out);
             }
         }
+        // Changes of one displacement at a time.
         for k in 0..task.tendons() {
             change.displacements[k] = 1.0;
-            told.push(sensitivity.forward(&change));
+            variations.push(sensitivity.forward(&change));
             change.displacements[k] = 0.0;
         }
-        let places = DMatrix::from_fn(3 * task.targets.len(), told.len(), |row, column| {
-            told[column].velocities[1 + row / 3][row % 3]
+        // ∂p and ∂T, one column per change.
+        let places = DMatrix::from_fn(3 * task.targets.len(), variations.len(), |row, column| {
+            variations[column].velocities[1 + row / 3][row % 3]
         });
-        let tensions = DMatrix::from_fn(task.tendons(), told.len(), |k, c| told[c].tensions[k]);
+        let tensions =
+            DMatrix::from_fn(task.tendons(), variations.len(), |k, c| variations[c].tensions[k]);
         (places, tensions)
     }
 }
@@ -299,7 +304,7 @@ mod tests {
         };
         let start = task.with_azimuths(&azimuths, &radii).unwrap();
         let point =
-            Point::under(&task, start, (azimuths, radii), &[150.0, 220.0]).unwrap().unwrap();
+            Point::at_tensions(&task, start, (azimuths, radii), &[150.0, 220.0]).unwrap().unwrap();
         for pulls in [Pulls::Tensions, Pulls::Displacements] {
             let freedom = Freedom { azimuths: true, radii: Some((1e-3, 2e-2)), pulls };
             let jacobian = point.jacobian(&task, &freedom).unwrap();
@@ -310,7 +315,9 @@ mod tests {
                 let at = |sign: f64| {
                     let mut moved = x.clone();
                     moved[i] += sign * step;
-                    task.off(&point.moved(&task, &freedom, &moved).unwrap().unwrap().state)
+                    task.residual(
+                        &point.with_unknowns(&task, &freedom, &moved).unwrap().unwrap().state,
+                    )
                 };
                 let difference = (at(1.0) - at(-1.0)) / (2.0 * step);
                 let column = jacobian.column(i);

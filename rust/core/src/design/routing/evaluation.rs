@@ -1,10 +1,10 @@
-//! What pulling a routing from rest does, and which of those that follow is the nearest.
+//! Evaluation of routings by pulling them from rest: the nearest of those that follow.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::continuous_holes::{Freedom, Point, Pulls};
-use super::hole_search::Search;
+use super::hole_search::HoleSearch;
 use super::task::{Holes, PerHole, Task};
 use crate::error::InvalidInput;
 use crate::model::Model;
@@ -20,7 +20,7 @@ const SHARES: [f64; 8] = [0.97, 0.93, 0.87, 0.8, 0.7, 0.55, 0.35, 0.15];
 
 /// A routing with the shape that comes of pulling it from rest.
 #[derive(Clone, Debug)]
-pub(super) struct Judged {
+pub(super) struct Evaluation {
     pub(super) point: Point,
     pub(super) holes: Option<Holes>,
     pub(super) shape: Shape,
@@ -28,17 +28,17 @@ pub(super) struct Judged {
     pub(super) value: f64,
 }
 
-impl Judged {
-    pub(super) fn met(&self, task: &Task<'_>) -> bool {
+impl Evaluation {
+    pub(super) fn is_met(&self, task: &Task<'_>) -> bool {
         let far = task.settings.tolerance * task.length();
         self.value.is_finite() && task.errors(&self.shape.state).iter().all(|e| *e <= far)
     }
 }
 
 /// The nearest routing that follows its displacements.
-pub(super) struct Judge<'t, 'a> {
+pub(super) struct Evaluator<'t, 'a> {
     task: &'t Task<'a>,
-    pub(super) best: Option<Judged>,
+    pub(super) best: Option<Evaluation>,
     /// Holes, and the bits of the tensions.
     tried: BTreeSet<(Holes, Vec<u64>)>,
     /// Those that do not.
@@ -46,7 +46,7 @@ pub(super) struct Judge<'t, 'a> {
     pub(super) steps: usize,
 }
 
-impl<'t, 'a> Judge<'t, 'a> {
+impl<'t, 'a> Evaluator<'t, 'a> {
     pub(super) fn new(task: &'t Task<'a>) -> Self {
         Self { task, best: None, tried: BTreeSet::new(), lost: Vec::new(), steps: 0 }
     }
@@ -56,15 +56,15 @@ impl<'t, 'a> Judge<'t, 'a> {
         self.best.as_ref().map_or(f64::INFINITY, |best| best.value)
     }
 
-    pub(super) fn met(&self) -> bool {
-        self.best.as_ref().is_some_and(|best| best.met(self.task))
+    pub(super) fn is_met(&self) -> bool {
+        self.best.as_ref().is_some_and(|best| best.is_met(self.task))
     }
 
     /// Pulls the nearest routings of a search, of those nearer than `least`; more than `most` of them only while
     /// none follows. Whether one has every disk in its place.
-    pub(super) fn found(
+    pub(super) fn evaluate_candidates(
         &mut self,
-        search: &Search<'_, '_>,
+        search: &HoleSearch<'_, '_>,
         most: usize,
         least: f64,
     ) -> Result<bool, InvalidInput> {
@@ -72,10 +72,10 @@ impl<'t, 'a> Judge<'t, 'a> {
         // Where all were looked at, none that is nearer may be left out.
         let whole = search.left_out.is_some();
         let (most, tried) = if whole { (usize::MAX, usize::MAX) } else { (most, TRIED) };
-        for (i, candidate) in search.found().into_iter().take(tried).enumerate() {
+        for (i, candidate) in search.candidates().into_iter().take(tried).enumerate() {
             let value = self.value();
             let enough = i >= most && value.is_finite();
-            if enough || candidate.value >= value || candidate.value > least || task.stopped() {
+            if enough || candidate.value >= value || candidate.value > least || task.is_stopped() {
                 break;
             }
             let bits = candidate.tensions.iter().map(|t| t.to_bits()).collect();
@@ -85,17 +85,21 @@ impl<'t, 'a> Judge<'t, 'a> {
                     candidate.tensions.iter().map(|t| t * task.plan.unit).collect();
                 let azimuths = task.azimuths(&candidate.holes, search.count);
                 let holes = (azimuths, task.radii.clone());
-                if let Some(point) = Point::under(task, robot, holes, &tensions)? {
-                    let point = self.within(point, Freedom::of_pulls())?;
+                if let Some(point) = Point::at_tensions(task, robot, holes, &tensions)? {
+                    let point = self.enforce_bounds(point, Freedom::of_pulls())?;
                     self.pull(point, Some(candidate.holes.clone()))?;
                 }
             }
         }
-        Ok(self.met())
+        Ok(self.is_met())
     }
 
-    /// The same point, or if a displacement is out of its bounds, where a descent within them leads.
-    pub(super) fn within(&mut self, point: Point, freedom: Freedom) -> Result<Point, InvalidInput> {
+    /// Point within the bounds of displacements: itself, or where a descent within them leads.
+    pub(super) fn enforce_bounds(
+        &mut self,
+        point: Point,
+        freedom: Freedom,
+    ) -> Result<Point, InvalidInput> {
         let task = self.task;
         let pulls = point.pulls(task);
         let own = point.displacements.iter().zip(&point.state.tensions);
@@ -105,7 +109,7 @@ impl<'t, 'a> Judge<'t, 'a> {
         if !pulls.iter().zip(own).any(out) {
             return Ok(point);
         }
-        let Some(moved) = point.pulled(task, pulls)? else { return Ok(point) };
+        let Some(moved) = point.at_displacements(task, pulls)? else { return Ok(point) };
         let freedom = Freedom { pulls: Pulls::Displacements, ..freedom };
         moved.descend(task, &freedom, &mut self.steps)
     }
@@ -127,7 +131,7 @@ impl<'t, 'a> Judge<'t, 'a> {
         if value < self.value() {
             let state = shape.state.clone();
             let point = Point { displacements: pulls, state, value, ..point };
-            self.best = Some(Judged { point, holes, shape, value });
+            self.best = Some(Evaluation { point, holes, shape, value });
         }
         Ok(true)
     }
@@ -139,7 +143,7 @@ impl<'t, 'a> Judge<'t, 'a> {
     }
 
     /// Given holes and displacements; whether the rod follows them to within `value`, or a nearer one is known.
-    pub(super) fn given(
+    pub(super) fn evaluate_given(
         &mut self,
         (azimuths, radii): (PerHole, PerHole),
         holes: Option<(Holes, usize)>,
@@ -162,12 +166,12 @@ impl<'t, 'a> Judge<'t, 'a> {
     }
 
     /// Routings that are nearer than the best but do not follow their displacements, pulled by less.
-    pub(super) fn ease(&mut self) -> Result<(), InvalidInput> {
+    pub(super) fn pull_by_less(&mut self) -> Result<(), InvalidInput> {
         let task = self.task;
         let mut lost = std::mem::take(&mut self.lost);
         lost.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         for (point, holes) in lost.into_iter().take(EASED) {
-            if point.value >= self.value() || task.stopped() {
+            if point.value >= self.value() || task.is_stopped() {
                 break;
             }
             let mut nearest: Option<Point> = None;
@@ -194,16 +198,20 @@ impl<'t, 'a> Judge<'t, 'a> {
 
     /// All tendons straight through the same holes, pulled as little as may be; where the rod does not follow that,
     /// the nearest of those through holes that go on or to and fro by as many from disk to disk that it follows.
-    pub(super) fn simple(&self, count: usize, radii: &PerHole) -> Result<Judged, InvalidInput> {
+    pub(super) fn regular_routing(
+        &self,
+        count: usize,
+        radii: &PerHole,
+    ) -> Result<Evaluation, InvalidInput> {
         let task = self.task;
-        let mut nearest = self.jumping(count, radii, |_| 0)?;
+        let mut nearest = self.stepped_routing(count, radii, |_| 0)?;
         let follows = nearest.value.is_finite();
         let most = if follows { 0 } else { task.settings.max_jump.unwrap_or(count).min(count / 2) };
         for jump in 1..=most {
             for to_and_fro in [false, true] {
                 let times = |disk: usize| if to_and_fro { disk % 2 } else { disk };
-                let next = self.jumping(count, radii, |disk| jump * times(disk) % count)?;
-                if next.value < nearest.value && !task.stopped() {
+                let next = self.stepped_routing(count, radii, |disk| jump * times(disk) % count)?;
+                if next.value < nearest.value && !task.is_stopped() {
                     nearest = next;
                 }
             }
@@ -211,12 +219,12 @@ impl<'t, 'a> Judge<'t, 'a> {
         Ok(nearest)
     }
 
-    fn jumping(
+    fn stepped_routing(
         &self,
         count: usize,
         radii: &PerHole,
         hole: impl Fn(usize) -> usize,
-    ) -> Result<Judged, InvalidInput> {
+    ) -> Result<Evaluation, InvalidInput> {
         let task = self.task;
         let holes: Holes = (0..task.disks()).map(|disk| vec![hole(disk); task.tendons()]).collect();
         let azimuths = task.azimuths(&holes, count);
@@ -234,6 +242,6 @@ impl<'t, 'a> Judge<'t, 'a> {
         let value = if follows { task.value(&shape.state) } else { f64::INFINITY };
         let (radii, state) = (radii.clone(), shape.state.clone());
         let point = Point { azimuths, radii, robot, state, displacements, value };
-        Ok(Judged { point, holes: given.then_some(holes), shape, value })
+        Ok(Evaluation { point, holes: given.then_some(holes), shape, value })
     }
 }

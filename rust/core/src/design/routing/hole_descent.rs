@@ -24,24 +24,27 @@ impl Point {
         freedom: &Freedom,
         steps: &mut usize,
     ) -> Result<Self, InvalidInput> {
+        // Levenberg-Marquardt steps.
         let mut here = self;
         let mut damping = DAMPING.0;
         for _ in 0..task.settings.max_iterations {
-            if task.stopped() || here.met(task, SPARE) {
+            if task.is_stopped() || here.is_met(task, SPARE) {
                 break;
             }
+            // JᵀJ and Jᵀr of the places by the unknowns.
             let jacobian = here.jacobian(task, freedom)?;
-            let off = task.off(&here.state);
+            let off = task.residual(&here.state);
             let [x, lower, upper] = here.unknowns(task, freedom);
             let units = freedom.units(task, x.len());
             let (gram, gradient) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&off));
+            // Damping grows until a step brings the disks nearer.
             let mut lowered = None;
-            while damping < DAMPING.2 && !task.stopped() {
+            while damping < DAMPING.2 && !task.is_stopped() {
                 *steps += 1;
                 let next = bounded_step(&gram, &gradient, (damping, &units), &x, [&lower, &upper]);
                 let Some(next) = next else { break };
-                let next = Self::limited(task, freedom, &x, next);
-                if let Some(point) = here.moved(task, freedom, &next)?
+                let next = Self::limit_step(task, freedom, &x, next);
+                if let Some(point) = here.with_unknowns(task, freedom, &next)?
                     && point.value < here.value
                 {
                     lowered = Some(point);
@@ -49,6 +52,7 @@ impl Point {
                 }
                 damping *= 10.0;
             }
+            // From there with less damping, while it is worth the step.
             let Some(point) = lowered else { break };
             let headway = 1.0 - point.value / here.value;
             here = point;
@@ -61,7 +65,7 @@ impl Point {
     }
 
     /// A step of which no angle and no tension goes too far.
-    fn limited(task: &Task<'_>, freedom: &Freedom, x: &[f64], next: Vec<f64>) -> Vec<f64> {
+    fn limit_step(task: &Task<'_>, freedom: &Freedom, x: &[f64], next: Vec<f64>) -> Vec<f64> {
         let pulls = x.len() - task.tendons();
         let mut share = 1.0_f64;
         for (i, (from, to)) in x.iter().zip(&next).enumerate() {

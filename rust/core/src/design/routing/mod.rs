@@ -1,6 +1,7 @@
 //! Routing design: the holes and pulls that bring a given backbone nearest to a wanted shape. The mathematics is
 //! in `docs/design.md`.
 
+mod answer;
 mod beam_search;
 mod best_tensions;
 mod canonical_task;
@@ -25,101 +26,23 @@ use nalgebra::Vector3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use self::canonical_task::{Posed, radii};
-use self::fewer_tendons::Designs;
-use self::result::told;
+use self::canonical_task::{CanonicalTask, radii};
+use self::fewer_tendons::TendonSubsets;
+use self::result::in_robot_frame;
 use self::task::Task;
 use crate::batch::Control;
 use crate::error::InvalidInput;
 use crate::inverse::Range;
-use crate::model::Shape;
 use crate::robot::{Path, Robot};
 use crate::rod::Plan;
-use crate::status::Status;
 
+pub use result::{Optimality, Routed};
 pub use settings::RoutingSettings;
-
-/// Wanted places are no further from the base than so many lengths: beyond, distances to all shapes round to the same.
-const FARTHEST: f64 = 1e6;
-
-/// What is known about the nearest routing.
-///
-/// ```
-/// use tdcr::design::Optimality;
-///
-/// assert_eq!(Optimality::Exhaustive.as_str(), "exhaustive");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Optimality {
-    /// Every disk is in its place: nothing is nearer.
-    Reached,
-    /// Every routing was looked at over a row of tensions.
-    Exhaustive,
-    /// The best that a search met.
-    Searched,
-}
-
-impl Optimality {
-    /// The name used in Python.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Reached => "reached",
-            Self::Exhaustive => "exhaustive",
-            Self::Searched => "searched",
-        }
-    }
-}
-
-/// A robot whose tendons were routed for a shape.
-///
-/// ```
-/// use tdcr::design::{RoutingSettings, routing};
-/// use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
-///
-/// # fn main() -> Result<(), tdcr::InvalidInput> {
-/// let backbone = Backbone::new(BackboneSpec::straight(0.1, 2))?;
-/// let robot = Robot::new(backbone, vec![Tendon::straight(0.0, 0.01)?], None, None, None)?;
-/// // The rest shape is reached without any pull.
-/// let targets: Vec<_> = robot.rest_frames().iter().skip(1).map(|disk| disk.translation).collect();
-/// let settings = RoutingSettings { holes: Some(4), ..RoutingSettings::default() };
-/// let found = routing(&robot, &targets, None, None, &settings)?;
-/// assert!(found.rms < 1e-9);
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Debug)]
-pub struct Routed {
-    /// The robot with its new tendons.
-    pub robot: Robot,
-    /// Its shape under the displacements, from rest.
-    pub shape: Shape,
-    /// Displacements \[m\].
-    pub displacements: Vec<f64>,
-    /// Numbers of each tendon's holes, disk 0 to its end; none where any azimuth was allowed.
-    pub holes: Option<Vec<Vec<usize>>>,
-    /// Distance of each disk from its wanted place, disk 0 first \[m\].
-    pub errors: Vec<f64>,
-    /// Root mean square distance of disks 1 to n \[m\].
-    pub rms: f64,
-    /// The same of the nearest routing with any azimuth that a descent from this one led to \[m\].
-    pub relaxed_rms: f64,
-    /// What is known about there being a nearer one.
-    pub optimality: Optimality,
-    /// Steps of descents and rounds of the search.
-    pub iterations: usize,
-    /// Equilibria of subsegments that the search solved.
-    pub evaluations: usize,
-    /// Converged: every disk is in its place; unreachable: the nearest routing that was found.
-    pub status: Status,
-    /// What stood in the way, or empty.
-    pub message: String,
-}
 
 /// The holes and displacements under which the disks 1 to n of a robot are nearest to `targets` (in the world
 /// \[m\]): least sum of squared distances. Backbone, ends, stiffness and names of the tendons are the robot's, and
-/// their radii unless the settings bound them; displacements stay within `bounds` \[m\]. A routed robot and its tensions
-/// may be what is looked at first.
+/// their radii unless the settings bound them; displacements stay within `bounds` \[m\]. A routed robot and its
+/// tensions may be looked at first.
 ///
 /// # Errors
 /// `InvalidInput` for another number of targets than subsegments, places that are not finite, a robot without
@@ -134,7 +57,7 @@ pub fn routing(
     routing_stopped_by(robot, targets, bounds, start, settings, &Arc::default())
 }
 
-/// The same, which ends soon after the flag is set, with the status of an iteration limit.
+/// [`routing`] that ends soon after the flag is set, with the status of an iteration limit.
 ///
 /// # Errors
 /// As [`routing`].
@@ -151,9 +74,9 @@ pub fn routing_stopped_by(
     let plan = Plan::new(robot, settings.rod)?;
     let radii = (0..robot.tendons().len()).map(|k| radii(robot, k)).collect();
     let task = Task { robot, targets, bounds, settings, stop, plan, radii };
-    let posed = Posed::new(robot, targets, bounds, start, settings)?;
-    let (answer, counted) = Designs::new(&posed, stop).run()?;
-    told(&task, &posed, &answer, counted)
+    let canonical = CanonicalTask::new(robot, targets, bounds, start, settings)?;
+    let (answer, counted) = TendonSubsets::new(&canonical, stop).run()?;
+    in_robot_frame(&task, &canonical, &answer, counted)
 }
 
 fn check(
@@ -167,14 +90,6 @@ fn check(
         return Err(InvalidInput::new("robot", "at least one tendon to route", "none"));
     }
     super::check_targets(robot, targets)?;
-    let (base, far) = (robot.base().translation, FARTHEST * robot.backbone().total_length());
-    if let Some(i) = targets.iter().position(|target| (target - base).amax() > far) {
-        let expected = format!(
-            "places within {far:.3e} m of the base, {FARTHEST:.0e} times the robot's length"
-        );
-        let got = format!("{:?} for disk {}", targets[i].as_slice(), i + 1);
-        return Err(InvalidInput::new("target_positions", expected, got));
-    }
     if let Some(bounds) = bounds {
         let (lower, upper) = bounds.values();
         for count in [lower.len(), upper.len()] {

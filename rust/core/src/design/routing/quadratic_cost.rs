@@ -1,4 +1,4 @@
-//! How near a routing is, as a function of its tensions.
+//! Squared distances of a routing as a quadratic function of its tensions.
 
 use nalgebra::Vector3;
 
@@ -9,7 +9,7 @@ const ROUNDS: usize = 6;
 
 /// Squared distances of the disks as a quadratic function of changes of the tensions.
 #[derive(Clone, Default)]
-pub(super) struct Sums {
+pub(super) struct QuadraticCost {
     pub(super) value: f64,
     pub(super) slope: Vec<f64>,
     pub(super) bend: Vec<f64>,
@@ -18,7 +18,7 @@ pub(super) struct Sums {
     pull_slopes: Vec<f64>,
 }
 
-impl Sums {
+impl QuadraticCost {
     pub(super) fn of(task: &Task<'_>) -> Self {
         let count = task.tendons();
         let pulls = if task.bounds.is_some() { count } else { 0 };

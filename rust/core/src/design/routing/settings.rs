@@ -14,7 +14,7 @@ use crate::rod::RodSettings;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoutingSettings {
-    /// Of the rod model that the design is for.
+    /// Settings of the rod model that the design is for.
     pub rod: RodSettings,
     /// Evenly spaced holes per disk; none: any azimuth.
     pub holes: Option<usize>,
@@ -57,9 +57,11 @@ impl RoutingSettings {
     /// # Errors
     /// `InvalidInput` for a value out of range, proportional tendons, and radii for holes that are given.
     pub fn validate(&self) -> Result<(), InvalidInput> {
+        // The rod model.
         self.rod.validate()?;
         let expected = "\"sliding\" (a proportional piece depends on the whole routing)";
         self.rod.tendons.require_tensions("rod.tendons", expected)?;
+        // Holes, by number or of any azimuth.
         if let Some(holes) = self.holes
             && !(1..=MOST_HOLES).contains(&holes)
         {
@@ -73,6 +75,7 @@ impl RoutingSettings {
             let expected = "none where any azimuth is allowed";
             return Err(InvalidInput::new("max_jump", expected, jump));
         }
+        // Radii are free only where azimuths are.
         if let Some((low, high)) = self.radius {
             if self.holes.is_some() {
                 let expected = "none where holes are given: they have the robot's radii";
@@ -83,6 +86,7 @@ impl RoutingSettings {
                 return Err(InvalidInput::new("radius", expected, format!("({low:?}, {high:?})")));
             }
         }
+        // The search.
         if !(1..=WIDEST).contains(&self.beam_width) {
             let expected = format!("a whole number from 1 to {WIDEST}");
             return Err(InvalidInput::new("beam_width", expected, self.beam_width));

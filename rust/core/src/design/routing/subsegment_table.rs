@@ -9,7 +9,7 @@ use crate::rod::one_subsegment::OneSubsegment;
 /// Numbers of the holes of all tendons on one disk.
 pub(super) type Choice = Vec<usize>;
 
-/// What a subsegment does between two choices: its end, and the velocity and angular velocity of that by each
+/// Equilibrium of a subsegment between two choices: its end, and the velocity and angular velocity of that by each
 /// tension, tendon by tendon.
 struct Entry {
     end: Pose,
@@ -28,8 +28,8 @@ struct Table {
 }
 
 /// All subsegments' shapes between the choices of their disks.
-pub(super) struct Field {
-    /// What every disk may have.
+pub(super) struct SubsegmentTables {
+    /// Choices of every disk.
     pub(super) choices: Vec<Vec<Choice>>,
     count: usize,
     tables: Vec<Table>,
@@ -45,7 +45,7 @@ pub(super) struct Link<'f> {
     pub(super) pull_slopes: &'f [f64],
 }
 
-impl Field {
+impl SubsegmentTables {
     /// For disks with `count` holes of which they may have these.
     pub(super) fn new(task: &Task<'_>, choices: Vec<Vec<Choice>>, count: usize) -> Self {
         let places = |disk: usize| {
@@ -80,7 +80,7 @@ impl Field {
             let first = entries.is_empty();
             entries.resize_with(from.len() * to.len(), || None);
             for (a, base) in from.iter().enumerate() {
-                if task.stopped() {
+                if task.is_stopped() {
                     return false;
                 }
                 for (b, next) in to.iter().enumerate() {
@@ -112,13 +112,13 @@ impl Field {
     }
 
     /// Equilibria that were asked for.
-    pub(super) fn solved(&self) -> usize {
+    pub(super) fn equilibria(&self) -> usize {
         self.tables.iter().map(|table| table.stage.solved).sum()
     }
 }
 
 impl Entry {
-    /// What a stage was solved for last.
+    /// Last solution of a subsegment.
     fn of(task: &Task<'_>, stage: &mut OneSubsegment) -> Self {
         let tendons = task.tendons();
         let mut rates = vec![(Vector3::zeros(), Vector3::zeros()); tendons];

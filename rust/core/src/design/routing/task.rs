@@ -1,4 +1,4 @@
-//! What a routing design is asked for, and robots with the holes that it tries.
+//! Task of a routing design, and robots with the holes that it tries.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -14,6 +14,9 @@ use crate::model::State;
 use crate::robot::{PerDisk, Robot, Routing, Tendon};
 use crate::rod::Plan;
 
+/// Holes per disk that a search uses where azimuths are free.
+pub(super) const FINE: usize = 24;
+
 /// Hole of every tendon on every disk: `holes[disk][tendon]`, 0 beyond a tendon's end.
 pub(super) type Holes = Vec<Vec<usize>>;
 
@@ -27,14 +30,14 @@ pub(super) struct Task<'a> {
     pub(super) bounds: Option<&'a Range>,
     pub(super) settings: &'a RoutingSettings,
     pub(super) stop: &'a Arc<AtomicBool>,
-    /// Of the robot's own routing.
+    /// Plan of the robot's own routing.
     pub(super) plan: Plan,
     /// Radii of the robot's own holes.
     pub(super) radii: PerHole,
 }
 
 impl Task<'_> {
-    pub(super) fn stopped(&self) -> bool {
+    pub(super) fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
@@ -60,8 +63,8 @@ impl Task<'_> {
         self.bounds.map_or((f64::NEG_INFINITY, f64::INFINITY), |bounds| bounds.at(tendon))
     }
 
-    /// What the disks from the first are off their places, one coordinate after the other \[m\].
-    pub(super) fn off(&self, state: &State) -> DVector<f64> {
+    /// Residual of the disks from the first: places minus wanted ones, one coordinate after the other \[m\].
+    pub(super) fn residual(&self, state: &State) -> DVector<f64> {
         let frames = state.frames.iter().skip(1).zip(self.targets);
         let off = frames.flat_map(|(frame, target)| {
             let off = frame.translation - target;
@@ -79,7 +82,7 @@ impl Task<'_> {
 
     /// Sum of the squared distances \[m²\].
     pub(super) fn value(&self, state: &State) -> f64 {
-        self.off(state).norm_squared()
+        self.residual(state).norm_squared()
     }
 
     /// Azimuth of a hole.
@@ -87,7 +90,7 @@ impl Task<'_> {
         self.settings.azimuth + TAU / count as f64 * hole as f64
     }
 
-    /// Whether a tendon may move on from one hole to another.
+    /// Permission to move on from one hole to another.
     pub(super) fn allows(&self, from: usize, to: usize, count: usize) -> bool {
         let jump = from.abs_diff(to);
         self.settings.max_jump.is_none_or(|most| jump.min(count - jump) <= most)
@@ -117,7 +120,7 @@ impl Task<'_> {
     }
 
     /// The robot with its tendons through other holes.
-    pub(super) fn routed(
+    pub(super) fn with_routing(
         &self,
         routing: impl Fn(usize, PerDisk) -> Routing,
         radii: &PerHole,
@@ -140,7 +143,7 @@ impl Task<'_> {
             radius,
             azimuth: self.settings.azimuth,
         };
-        self.routed(routing, &self.radii)
+        self.with_routing(routing, &self.radii)
     }
 
     /// The robot with its tendons through holes given by azimuth and radius.
@@ -153,11 +156,11 @@ impl Task<'_> {
             azimuth: PerDisk::Each(azimuths[k].clone()),
             radius,
         };
-        self.routed(routing, radii)
+        self.with_routing(routing, radii)
     }
 
-    /// Moment in every subsegment, as a share of the bending stiffness, by which the rest shape would bend to the wanted
-    /// places without torsion: the direction of bending's azimuth, and the amount \[rad\].
+    /// Moment in every subsegment, as a share of the bending stiffness, by which the rest shape would bend to the
+    /// wanted places without torsion: the direction of bending's azimuth, and the amount \[rad\].
     pub(super) fn bends(&self) -> Vec<(f64, f64)> {
         let mut frame = *self.robot.base();
         let mut out = Vec::with_capacity(self.targets.len());
@@ -176,7 +179,7 @@ impl Task<'_> {
         out
     }
 
-    /// How much of all bending lies before each disk from the first: what is pulled until there.
+    /// Share of all bending that lies before each disk from the first: what is pulled until there.
     pub(super) fn shares(&self) -> Vec<f64> {
         let bends = self.bends();
         let whole: f64 = bends.iter().map(|(_, angle)| angle).sum();

@@ -1,5 +1,6 @@
 //! The inverse of the constant-curvature model.
 
+mod solution;
 mod starts;
 
 use std::borrow::Cow;
@@ -19,6 +20,7 @@ use crate::model::Model;
 use crate::robot::Robot;
 use crate::solve::levenberg_marquardt::Problem;
 use crate::status::Status;
+pub use solution::Solution;
 pub(super) use starts::arc_to;
 
 /// Buffers of a solve and the arcs it found.
@@ -369,39 +371,3 @@ const FAR: f64 = 1e3;
 
 /// Unknowns that differ by more than this are other answers.
 const DISTINCT: f64 = 1e-6;
-
-/// One of several answers.
-///
-/// ```
-/// # use nalgebra::Vector3;
-/// # use tdcr::constant_curvature::{ConstantCurvatureSettings, Plan};
-/// # use tdcr::inverse::{Bounds, ConstantCurvatureInverse, InverseSettings, Target};
-/// # use tdcr::robot::{Backbone, BackboneSpec, Robot, Tendon};
-/// # fn main() -> Result<(), tdcr::InvalidInput> {
-/// # let backbone = Backbone::new(BackboneSpec::straight(0.2, 10))?;
-/// # let tendons = [0.0, 2.1, 4.2].map(|azimuth| Tendon::straight(azimuth, 0.01));
-/// # let tendons = tendons.into_iter().collect::<Result<Vec<_>, _>>()?;
-/// # let robot = Robot::new(backbone, tendons, None, None, None)?;
-/// # let plan = Plan::new(&robot, ConstantCurvatureSettings::default())?;
-/// # let (bounds, settings) = (Bounds::default(), InverseSettings::default());
-/// # let inverse = ConstantCurvatureInverse::new(&robot, &plan, &bounds, settings)?;
-/// let tip = tdcr::constant_curvature::Arc::new(5.0, 1.0, 0.2).frame(1.0).translation;
-/// let solutions = inverse.solutions(&Target::Position(tip));
-/// assert!(solutions.iter().any(|solution| (solution.arcs[0].kappa() - 5.0).abs() < 1e-6));
-/// assert!(solutions.is_sorted_by(|a, b| a.energy <= b.energy));
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-pub struct Solution {
-    /// Its arcs, base first.
-    pub arcs: Vec<Arc>,
-    /// Its displacements \[m\].
-    pub displacements: Vec<f64>,
-    /// Its bending energy, in a unit common to the answers.
-    pub energy: f64,
-    /// Number of starts that led to it.
-    pub hits: usize,
-    /// Outcome of its search.
-    pub answer: Answer,
-}

@@ -62,6 +62,7 @@ impl RodInverse<'_> {
         }
     }
 
+    /// [`Self::solve_positions`] for checked positions and at most R - 1 tendons.
     fn solve_for<const R: usize>(
         &self,
         places: &[Option<Vector3<f64>>],
@@ -74,6 +75,7 @@ impl RodInverse<'_> {
         let length = self.robot.backbone().total_length();
         let goal = PositionGoal::new(known.collect(), length, self.settings.position_tolerance);
         let lengths = self.rest.rest_lengths();
+        // Start points: the shape that was given, then guesses.
         let mut problem =
             TensionProblem::new(self.equilibrium(stop), goal, lengths, &self.units, &self.ranges);
         let mut search = Multistart::<R> { stop, ..Multistart::default() };
@@ -86,6 +88,7 @@ impl RodInverse<'_> {
             None => point.clone_from(&first),
             Some(k) => self.positions_start(&local, k, point),
         };
+        // Least squares from all of them, in contact from rest.
         let options =
             SearchOptions { freedom: Freedom::None, fall_back: false, ..self.options(STARTS) };
         let options = SearchOptions { starts: options.starts.min(self.settings.starts), ..options };
@@ -96,6 +99,7 @@ impl RodInverse<'_> {
             }
             None => search.run(&mut problem, &self.space, options, start_point),
         };
+        // Outcome, and the reason in a sentence.
         let answer =
             evaluate_answer(found, &mut problem, &mut search, |goal| (goal.errors().0, 0.0));
         let (most, mean, disk) = problem.goal.errors();

@@ -76,7 +76,7 @@ impl Loads {
     ///
     /// # Errors
     /// As [`Self::validate`], and for another number of disk forces than disks or a backbone without Young's
-    /// modulus, in whose units no newton can be told.
+    /// modulus, whose results have no newtons.
     pub fn forces(&self, robot: &Robot) -> Result<(Vec<Vector3<f64>>, Vector3<f64>), InvalidInput> {
         let backbone = robot.backbone();
         if !backbone.has_stiffness() {

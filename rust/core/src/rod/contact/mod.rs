@@ -3,7 +3,8 @@
 //! The mathematics is in `docs/contact.md`, whose letters the code uses. From the bottom up: `scene` and `loads`
 //! are what surrounds a robot, `potential` and `lagrangian` the function that is minimised, `riccati` its Newton
 //! step, `augmented_lagrangian` the minimisation at given multipliers and their updates, `continuation` the way
-//! from rest in load steps, whose places `load_state` keeps, and `model` the forward model.
+//! from rest in load steps, whose states are `load_state`, `model` the forward model, and `start` what its solves begin
+//! with.
 
 mod augmented_lagrangian;
 mod continuation;

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{Vector3, Vector6};
 
+use super::memory::{distance, farthest, nearest};
 use super::{Equilibrium, Motion, Twist};
 use crate::lie::{Pose, so3};
 use crate::model::{Model, State};
@@ -27,17 +28,6 @@ struct Point {
     checkpoint: Checkpoint,
     tensions: Vec<f64>,
     converged: bool,
-}
-
-impl Point {
-    /// Largest difference of its tensions from others; infinite where it is no equilibrium.
-    fn distance(&self, tensions: &[f64]) -> f64 {
-        if !self.converged {
-            return f64::INFINITY;
-        }
-        let pairs = self.tensions.iter().zip(tensions);
-        pairs.fold(0.0, |most, (a, b)| most.max((a - b).abs()))
-    }
 }
 
 /// A rod among obstacles under tensions, near points where it was in equilibrium before.
@@ -164,9 +154,9 @@ impl Equilibrium for ContactRod<'_> {
     }
 
     fn solve_at(&mut self, tensions: &[f64]) -> bool {
-        let distances = self.points.each_ref().map(|point| point.distance(tensions));
-        let nearest =
-            (0..POINTS).fold(0, |best, k| if distances[k] < distances[best] { k } else { best });
+        let distances = self.points.each_ref();
+        let distances = distances.map(|p| distance(p.converged, &p.tensions, tensions));
+        let nearest = nearest(&distances);
         if distances[nearest] == 0.0 && nearest == self.at && self.is_current {
             return true;
         }
@@ -184,10 +174,7 @@ impl Equilibrium for ContactRod<'_> {
         }
         // The new point takes the place of the farthest one.
         if is_known && distances[nearest] > 0.0 {
-            let others = (0..POINTS).filter(|k| *k != nearest);
-            self.at = others.fold((nearest + 1) % POINTS, |worst, k| {
-                if distances[k] > distances[worst] { k } else { worst }
-            });
+            self.at = farthest(&distances, nearest);
         }
         self.points[self.at] = point;
         true

@@ -102,10 +102,12 @@ impl Sensitivity<'_> {
                 out.holes[piece.tendon][i + 1] += by.to;
                 share += by.share;
                 if self.at.equations[p].is_some() {
-                    let by = plan.settings.tendons.bound_weights(&self.piece_bound(p), multiplier);
+                    let bound = self.piece_bound(p);
+                    let by = plan.settings.tendons.bound_weights(&bound, multiplier);
                     weights[p] += by.piece;
                     whole[piece.tendon] += by.tendon;
                     out.displacements[piece.tendon] += by.displacement;
+                    out.stiffness[piece.tendon] -= by.strain * bound.strain;
                 }
             }
             // Lengths: by the stiffness, and by the holes that they move.

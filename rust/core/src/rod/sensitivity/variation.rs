@@ -70,12 +70,13 @@ impl Sensitivity<'_> {
                 // −dr = db − dL.
                 if let Some(row) = self.at.equations[p] {
                     lengths[row] -= at.direction.dot(&moved);
+                    let bound = self.piece_bound(p);
                     let rate = BoundRate {
                         piece: rest[p],
                         tendon: whole[piece.tendon],
                         displacement: change.displacements[piece.tendon],
+                        strain: -bound.strain * change.stiffness[piece.tendon],
                     };
-                    let bound = self.piece_bound(p);
                     lengths[row] += plan.settings.tendons.bound_rate(&bound, &rate);
                 }
             }
