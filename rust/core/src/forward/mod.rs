@@ -176,9 +176,7 @@ impl<'r> Forward<'r> {
         let scene = match &self.plan {
             Plan::Rod(plan) if !obstacles.is_empty() || loads.is_some() => {
                 let radius = plan.settings.body_radius;
-                let scene = Scene::new(self.robot, plan, obstacles, loads, radius)?;
-                LoadedRod::new(self.robot, plan, &scene)?;
-                Some(scene)
+                Some(Scene::new(self.robot, plan, obstacles, loads, radius)?)
             }
             _ => None,
         };

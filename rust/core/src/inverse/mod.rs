@@ -29,5 +29,5 @@ pub use constant_curvature::{ConstantCurvatureInverse, Scratch, Solution};
 pub use outcome::Answer;
 pub use rod::{RodInverse, RodScratch};
 pub use settings::{InverseSettings, Method};
-pub use single::{Inversion, invert};
+pub use single::{Inversion, invert, solve_start};
 pub use target::Target;

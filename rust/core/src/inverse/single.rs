@@ -61,8 +61,7 @@ pub fn invert<I: Inverter>(
     stop: Option<&Arc<AtomicBool>>,
 ) -> Result<Inversion, InvalidInput> {
     inverse.check_target(target)?;
-    let of_start = |error| InvalidInput { argument: "start".to_owned(), ..error };
-    let start = start.map(|own| inverse.start(own, stop).map_err(of_start)).transpose()?;
+    let start = solve_start(inverse, start, stop)?;
     let mut work = inverse.buffers(stop.map(AsRef::as_ref));
     let answer = inverse.solve(target, start.as_ref(), &mut work);
     let mut displacements = vec![f64::NAN; inverse.robot().tendons().len()];
@@ -72,6 +71,19 @@ pub fn invert<I: Inverter>(
     let message = inverse.message(&answer, &work);
     let state = inverse.state(&mut work);
     Ok(Inversion { answer, displacements, tensions, message, state })
+}
+
+/// Solved start of an inverse from displacements, if given \[m\].
+///
+/// # Errors
+/// As [`Inverter::start`], naming the start.
+pub fn solve_start<I: Inverter>(
+    inverse: &I,
+    displacements: Option<&[f64]>,
+    stop: Option<&Arc<AtomicBool>>,
+) -> Result<Option<I::Start>, InvalidInput> {
+    let start = displacements.map(|own| inverse.start(own, stop)).transpose();
+    start.map_err(|error| InvalidInput { argument: "start".to_owned(), ..error })
 }
 
 impl Robot {

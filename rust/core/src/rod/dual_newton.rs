@@ -194,7 +194,7 @@ impl DualNewton {
             if *budget == 0 {
                 return (Ending::Spent, residual);
             }
-            match self.judge(plan, &mut path, &residual, system) {
+            match self.accept_or_shorten(plan, &mut path, &residual, system) {
                 Verdict::Good => {}
                 Verdict::Retry => continue,
                 Verdict::Lost => return (Ending::Lost, residual),
@@ -215,8 +215,8 @@ impl DualNewton {
         }
     }
 
-    /// Judges the point that was assembled: good to go on from, or the system is put at another.
-    fn judge(
+    /// Accepts the point that was assembled, or puts the system at another: start of tighter balance, shorter step.
+    fn accept_or_shorten(
         &self,
         plan: &Plan,
         path: &mut Path,

@@ -98,7 +98,7 @@ pub(crate) fn _chained_shape(
     }
     let around = Surroundings::new(py, Some(obstacles), loads)?;
     let chained = |forward: &Forward<'_>| forward.chained_shape(flat, row);
-    let shape = run(py, around.prepare(core, settings)?, Some(&around), chained)?;
+    let shape = run(py, around.prepare(core, settings)?, chained)?;
     let displacements = flat[row * tendons..(row + 1) * tendons].to_vec();
     Ok(Shape::new(robot.get().clone(), settings, Solution { displacements, shape }).among(around))
 }

@@ -60,8 +60,7 @@ pub(crate) fn jacobian(
     let core = &robot.get().0;
     let start = start.map(|start| start_state(core, &settings, start)).transpose()?;
     let forward = Forward::new(core, settings).map_err(|e| invalid(&e))?;
-    let columns =
-        run(py, forward, None, |forward| forward.jacobian(&displacements, start.as_ref()))?;
+    let columns = run(py, forward, |forward| forward.jacobian(&displacements, start.as_ref()))?;
     match columns {
         Ok(matrix) => frozen_columns(py, &matrix),
         Err(shape) => {

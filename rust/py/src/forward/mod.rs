@@ -16,6 +16,7 @@ use tdcr::InvalidInput;
 use tdcr::forward::{Forward, Load, ModelSettings};
 use tdcr::model::{State, rod_only};
 use tdcr::robot as core;
+use tdcr::rod::contact::Scene;
 
 use crate::convert::arrays::{float_array, invalid, type_name, values, wrong_shape};
 use crate::convert::interruptible;
@@ -104,7 +105,7 @@ pub(crate) fn forward(
     let core = &robot.get().0;
     let start = start.map(|start| start_state(core, &settings, start)).transpose()?;
     let solve = |forward: &Forward<'_>| forward.solve(load, start.as_ref());
-    let solution = run(py, around.prepare(core, settings)?, Some(&around), solve)?;
+    let solution = run(py, around.prepare(core, settings)?, solve)?;
     Ok(Shape::new(robot.get().clone(), settings, solution).among(around))
 }
 
@@ -113,10 +114,9 @@ pub(crate) fn forward(
 pub(crate) fn run<T: Send>(
     py: Python<'_>,
     forward: Forward<'_>,
-    around: Option<&Surroundings>,
     job: impl FnOnce(&Forward<'_>) -> Result<T, InvalidInput> + Send,
 ) -> PyResult<T> {
-    let listens = around.is_some_and(Surroundings::calls_functions);
+    let listens = forward.scene().is_some_and(Scene::calls_functions);
     let microseconds = if listens { 0.0 } else { forward.estimated_microseconds() };
     let (answer, fault) = interruptible::run_if_long(py, microseconds, |control| {
         let forward = forward.stopped_by(&control.stop);

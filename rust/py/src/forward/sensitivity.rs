@@ -75,9 +75,7 @@ pub(crate) fn sensitivity(py: Python<'_>, shape: &Bound<'_, PyAny>) -> PyResult<
     }
     let plan = Plan::rod(own.core_robot(), settings).map_err(|e| invalid(&e))?;
     let forward = Forward::new(own.core_robot(), own.model_settings()).map_err(|e| invalid(&e))?;
-    let at = run(py, forward, None, |forward| {
-        forward.linearize(own.state(), own.displacement_values())
-    })?;
+    let at = run(py, forward, |forward| forward.linearize(own.state(), own.displacement_values()))?;
     Ok(Sensitivity { shape: shape.clone().unbind(), plan, at })
 }
 
@@ -188,15 +186,15 @@ impl Sensitivity {
             self.read_holes(given, &mut change.holes)?;
         }
         change.poisson_ratio = poisson_ratio;
-        let told = py.detach(|| sensitivity.forward(&change));
+        let variation = py.detach(|| sensitivity.forward(&change));
         let state = self.shape.get().state();
-        let (count, tendons) = (state.strains.len(), told.tensions.len());
-        let width = told.strains.len() / count;
+        let (count, tendons) = (state.strains.len(), variation.tensions.len());
+        let width = variation.strains.len() / count;
         let fields = (
-            frozen(py, told.strains, &[count, width])?,
-            frozen(py, told.tensions, &[tendons])?,
-            frozen_points(py, told.velocities.into_iter())?,
-            frozen_points(py, told.spins.into_iter())?,
+            frozen(py, variation.strains, &[count, width])?,
+            frozen(py, variation.tensions, &[tendons])?,
+            frozen_points(py, variation.velocities.into_iter())?,
+            frozen_points(py, variation.spins.into_iter())?,
         );
         python_side::VARIATION.get(py)?.call1(fields)
     }

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 
 use tdcr::forward::{Forward, Load, ModelSettings, Plan};
 use tdcr::inverse::{
-    Answer, ConstantCurvatureInverse, Inversion, Inverter, Method, RodInverse, invert,
+    Answer, ConstantCurvatureInverse, Inversion, Inverter, Method, RodInverse, invert, solve_start,
 };
 use tdcr::model::rod_only;
 use tdcr::rod::contact::Scene;
@@ -129,11 +129,6 @@ pub(crate) fn one_start(
     Ok(Some(values(&array)?.to_vec()))
 }
 
-/// Errors of a start that is solved for name it.
-fn of_start(error: InvalidInput) -> InvalidInput {
-    InvalidInput { argument: "start".to_owned(), ..error }
-}
-
 /// (displacements, tensions, status, message, error, `rotation_error`, iterations, starts)
 type Row = (Py<PyAny>, Py<PyAny>, Py<PyAny>, String, f64, f64, usize, usize);
 
@@ -218,7 +213,7 @@ fn with_shape(
             let load = Load::Displacements(displacements.clone());
             let solve = |forward: &Forward<'_>| forward.solve(load, Some(&state));
             let core = &robot.get().0;
-            let solution = run(py, around.prepare(core, settings)?, Some(&around), solve)?;
+            let solution = run(py, around.prepare(core, settings)?, solve)?;
             Some(Shape::new(robot.get().clone(), settings, solution).among(around))
         }
         None => None,
@@ -287,8 +282,7 @@ fn invert_positions(
     let start = one_start(inverse.robot(), start)?;
     interruptible::run(py, None, |control| {
         around.stopped_by(&control.stop);
-        let begin = |own: Vec<f64>| inverse.start(&own, Some(&control.stop)).map_err(of_start);
-        let start = start.map(begin).transpose()?;
+        let start = solve_start(inverse, start.as_deref(), Some(&control.stop))?;
         inverse.solve_positions(&positions, start.as_ref(), Some(&control.stop))
     })
 }

@@ -79,11 +79,6 @@ impl Surroundings {
         self.loads.as_ref().map(|_| "loads")
     }
 
-    /// Presence of a function of the caller's among the obstacles.
-    pub(crate) fn calls_functions(&self) -> bool {
-        self.obstacles.iter().any(|o| matches!(o.volume(), Volume::SignedDistance(_)))
-    }
-
     /// Refuses surroundings for a model that knows no forces.
     pub(crate) fn check(&self, settings: &ModelSettings) -> PyResult<()> {
         let loads = self.loads.as_ref().map(|loads| &loads.0);

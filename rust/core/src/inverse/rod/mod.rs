@@ -360,10 +360,10 @@ impl Inverter for RodInverse<'_> {
             return self.no_shape_message(answer);
         }
         let active = self.active_bounds(&work.search.point, &work.problem);
-        let told = message_of(answer, &self.settings, &active, "tension");
+        let message = message_of(answer, &self.settings, &active, "tension");
         match &work.from_rest {
-            Some(from_rest) if told.is_empty() => from_rest.message().to_owned(),
-            _ => told,
+            Some(from_rest) if message.is_empty() => from_rest.message().to_owned(),
+            _ => message,
         }
     }
 
